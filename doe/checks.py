@@ -29,10 +29,10 @@ def checked_number(name: str, value: Any, above: float = -math.inf, least: float
         Anything else, with the rule and what was received.
     """
     if not isinstance(value, numbers.Real) or isinstance(value, bool | np.bool_):
-        raise DesignError(f"{name} must be a number, received {value!r}")
+        raise DesignError(f"{name} must be a number, got {value!r}")
     number = float(value)
     if not math.isfinite(number) or not number > above or not number >= least:
-        raise DesignError(f"{name} must be {_range(above, least)}, received {value}")
+        raise DesignError(f"{name} must be {_range(above, least)}, got {value}")
     return number
 
 
@@ -50,7 +50,7 @@ Kind = TypeVar("Kind")
 def checked_kind(name: str, value: Any, kind: type[Kind]) -> Kind:
     """Return a value; raise DesignError unless it is of a kind, such as a Design or a Surface."""
     if not isinstance(value, kind):
-        raise DesignError(f"{name} must be a {kind.__name__}, received {value!r}")
+        raise DesignError(f"{name} must be a {kind.__name__}, got {value!r}")
     return value
 
 
@@ -62,21 +62,21 @@ def checked_list(name: str, values: Any) -> list:
         or isinstance(values, str | bytes | Mapping)
         or hasattr(values, "columns")
     ):
-        raise DesignError(f"{name} must be a list, received {values!r}")
+        raise DesignError(f"{name} must be a list, got {values!r}")
     return list(values)
 
 
 def checked_flag(name: str, value: Any) -> bool:
     """Return a truth value; raise DesignError for anything else."""
     if not isinstance(value, bool | np.bool_):
-        raise DesignError(f"{name} must be True or False, received {value!r}")
+        raise DesignError(f"{name} must be True or False, got {value!r}")
     return bool(value)
 
 
 def checked_choice(name: str, value: Any, choices: Collection[str]) -> str:
     """Return a name; raise DesignError unless it is one of some."""
     if not isinstance(value, str) or value not in choices:
-        raise DesignError(f"{name} is one of {', '.join(choices)}, received {value!r}")
+        raise DesignError(f"{name} is one of {', '.join(choices)}, got {value!r}")
     return value
 
 
@@ -85,7 +85,7 @@ def checked_map(name: str, value: Any) -> dict:
     import pandas as pd
 
     if not isinstance(value, Mapping | pd.Series):
-        raise DesignError(f"{name} must be a mapping by name, received {value!r}")
+        raise DesignError(f"{name} must be a mapping by name, got {value!r}")
     return dict(value)
 
 
@@ -97,7 +97,7 @@ def checked_seed(value: Any) -> int | None:
 def checked_level(value: Any, name: str = "alpha") -> float:
     """Return a probability that lies between 0 and 1, such as the level of a test."""
     if not isinstance(value, numbers.Real) or isinstance(value, bool) or not 0.0 < float(value) < 1.0:
-        raise DesignError(f"{name} lies between 0 and 1, received {value!r}")
+        raise DesignError(f"{name} lies between 0 and 1, got {value!r}")
     return float(value)
 
 
@@ -109,16 +109,16 @@ def checked_count(name: str, value: Any, least: int = 1, most: float = math.inf)
     """Return a whole number that is at least ``least`` and at most ``most``."""
     whole = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
     if not whole or not math.isfinite(value) or int(value) != value or int(value) < least:
-        raise DesignError(f"{name} must be a whole number of at least {least}, received {value!r}")
+        raise DesignError(f"{name} must be a whole number of at least {least}, got {value!r}")
     if value > most:
-        raise DesignError(f"{name} must be at most {most}, received {value}")
+        raise DesignError(f"{name} must be at most {most}, got {value}")
     return int(value)
 
 
 def checked_df(name: str, value: Any) -> float:
     """Return degrees of freedom: a positive number, which may be infinite."""
     if not isinstance(value, numbers.Real) or isinstance(value, bool) or not float(value) > 0.0:
-        raise DesignError(f"{name} must be positive, received {value!r}")
+        raise DesignError(f"{name} must be positive, got {value!r}")
     return float(value)
 
 
@@ -133,11 +133,11 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """
     if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
         place = tuple(int(i) + 1 for i in np.argwhere(np.ma.getmaskarray(values))[0])
-        raise DesignError(f"{name}: a masked value is no measurement, received one at position {place}")
+        raise DesignError(f"{name}: a masked value is no measurement, got one at position {place}")
     if isinstance(values, str | bytes | dict | set) or values is None:
-        raise DesignError(f"{name} must be numbers, received {values!r}")
+        raise DesignError(f"{name} must be numbers, got {values!r}")
     if getattr(getattr(values, "dtype", None), "name", "") == "category":
-        raise DesignError(f"{name} must be real numbers, received categories")
+        raise DesignError(f"{name} must be real numbers, got categories")
     try:
         array = np.asarray(values)
         if array.dtype == object:  # pandas' missing values, Python's fractions and decimals, or no numbers
@@ -159,7 +159,7 @@ def checked_points(coded: ArrayLike, factor_count: int) -> NDArray[np.float64]:
     """Return coded points, shape (points, factors); one point may be given as a row of its own."""
     points = np.atleast_2d(real_array("coded points", coded))
     if points.ndim != 2 or points.shape[1] != factor_count:
-        raise DesignError(f"coded points have shape (points, {factor_count}), received {points.shape}")
+        raise DesignError(f"coded points have shape (points, {factor_count}), got {points.shape}")
     if not np.isfinite(points).all():
-        raise DesignError(f"coded points are finite, received {points[~np.isfinite(points)][0]}")
+        raise DesignError(f"coded points are finite, got {points[~np.isfinite(points)][0]}")
     return points

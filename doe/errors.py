@@ -12,18 +12,18 @@ class TargetError(DesignError):
 
 
 class RuleError(DesignError):
-    """An input breaks a rule; the message is made of the rule, the value received and its place.
+    """An input breaks a rule: ``place: problem, got value``.
 
     Parameters
     ----------
-    rule, value, place
-        What must hold, what was received, and where.
+    place, problem, value
+        Where, what must hold, and what was received.
     """
 
-    def __init__(self, rule: str, value: object, place: str) -> None:
-        self.rule, self.place = rule, place
+    def __init__(self, place: str, problem: str, value: object) -> None:
+        self.place, self.problem = place, problem
         self.value = value if isinstance(value, str) else repr(value)
-        super().__init__(f"{place}: {rule} (received {self.value})")
+        super().__init__(f"{place}: {problem}, got {self.value}")
 
     def __reduce__(self) -> tuple[type, tuple[str, str, str]]:
-        return type(self), (self.rule, self.value, self.place)
+        return type(self), (self.place, self.problem, self.value)

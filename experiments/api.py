@@ -247,7 +247,9 @@ def bridge(
     source = read_source(Path(card))
     within = check_order(source, runs, fresh, margin)
     if engine is None and command is None:
-        raise InputError("a bridge leads to another solver: --engine NAME or --command", "none", "engine")
+        raise InputError(
+            "engine", "expected a bridge leads to another solver: --engine NAME or --command", "none"
+        )
     limits = {"time_limit": time_limit, "approximate": approximate or None}
     study = with_engine(source.study, engine, command, **limits)
     folder = Path(out) if out is not None else default_folder(study, "bridge")

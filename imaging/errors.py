@@ -13,20 +13,20 @@ def shortened(value: object) -> str:
 
 
 class PictureError(ValueError):
-    """A picture without a measurable heap, or a wrong measurement setting.
+    """A picture without a measurable heap, or a wrong measurement setting: ``place: problem, got value``.
 
     Parameters
     ----------
-    rule : str
+    place : str
+        Where: a file, a view of a heap, the name of an argument.
+    problem : str
         What must hold.
     value : object
         What was received instead.
-    place : str
-        Where: a file, a view of a heap, the name of an argument.
     """
 
-    def __init__(self, rule: str, value: object, place: str) -> None:
-        super().__init__(f"{place}: expected: {rule}; received {shortened(value)}")
-        self.rule = rule
-        self.value = value
+    def __init__(self, place: str, problem: str, value: object) -> None:
+        super().__init__(f"{place}: {problem}, got {shortened(value)}")
         self.place = place
+        self.problem = problem
+        self.value = value

@@ -23,9 +23,11 @@ class FitSettings:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.lower < self.upper <= 1.0:
-            raise PictureError("0 <= lower < upper <= 1", (self.lower, self.upper), f"fit {self.name!r}")
+            raise PictureError(
+                f"fit {self.name!r}", "expected 0 <= lower < upper <= 1", (self.lower, self.upper)
+            )
         if not 0.0 <= self.toe <= 5.0:
-            raise PictureError("0 <= toe <= 5", self.toe, f"fit {self.name!r}")
+            raise PictureError(f"fit {self.name!r}", "expected 0 <= toe <= 5", self.toe)
 
     @classmethod
     def of(cls, fit: str | FitSettings) -> FitSettings:
@@ -33,7 +35,9 @@ class FitSettings:
         if isinstance(fit, FitSettings):
             return fit
         if fit not in FITS:
-            raise PictureError(f"the fit is one of {', '.join(FITS)}, or FitSettings", repr(fit), "fit")
+            raise PictureError(
+                "fit", f"expected the fit is one of {', '.join(FITS)}, or FitSettings", repr(fit)
+            )
         return FITS[fit]
 
 

@@ -54,8 +54,8 @@ def fit_flanks(outline: Outline, settings: FitSettings, place: str) -> tuple[Fla
     """Fit a line to the left and to the right flank of an outline; `place` names it in errors."""
     x, h = outline.position, outline.height
     if len(x) < 2 * MINIMUM_FLANK_COLUMNS:
-        rule = f"an outline has at least {2 * MINIMUM_FLANK_COLUMNS} columns"
-        raise PictureError(rule, len(x), place)
+        rule = f"expected an outline has at least {2 * MINIMUM_FLANK_COLUMNS} columns"
+        raise PictureError(place, rule, len(x))
     apex = apex_column(x, h)
     left = _fit_flank(x[:apex], h[:apex], settings, f"{place}, left flank")
     right = _fit_flank(-x[apex:][::-1], h[apex:][::-1], settings, f"{place}, right flank")
@@ -102,11 +102,11 @@ def _fit_flank(x: FloatArray, h: FloatArray, settings: FitSettings, place: str) 
     chosen = _fit_region(h[base:], settings)
     x, h = x[base:][chosen], h[base:][chosen]
     if len(x) < MINIMUM_FLANK_COLUMNS:
-        rule = f"the fit {settings.name!r} covers at least {MINIMUM_FLANK_COLUMNS} columns"
-        raise PictureError(rule, len(x), place)
+        rule = f"expected the fit {settings.name!r} covers at least {MINIMUM_FLANK_COLUMNS} columns"
+        raise PictureError(place, rule, len(x))
     slope, intercept, residual = _line(x, h)
     if slope <= 0.0:
-        raise PictureError("the flank rises towards the apex", f"slope {slope:.3g}", place)
+        raise PictureError(place, "expected the flank rises towards the apex", f"slope {slope:.3g}")
     step = float(np.median(np.diff(x)))
     error = slope_error(x, residual)
     return FlankLine(

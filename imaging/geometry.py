@@ -37,14 +37,18 @@ class Spheres:
 
     def __post_init__(self) -> None:
         if self.centers.ndim != 2 or self.centers.shape[1] != 3 or len(self.centers) == 0:
-            raise PictureError("centres are an (n, 3) array with n > 0", self.centers.shape, "centers")
+            raise PictureError(
+                "centers", "expected centres are an (n, 3) array with n > 0", self.centers.shape
+            )
         if self.radii.shape != (len(self.centers),):
-            raise PictureError("there is one radius for each centre", self.radii.shape, "radii")
+            raise PictureError("radii", "expected there is one radius for each centre", self.radii.shape)
         bad = ~(np.isfinite(self.centers).all(axis=1) & np.isfinite(self.radii) & (self.radii > 0))
         if bad.any():
             row = int(np.argmax(bad))
             received = (*self.centers[row].tolist(), float(self.radii[row]))
-            raise PictureError("centres are finite and radii finite and positive", received, f"sphere {row}")
+            raise PictureError(
+                f"sphere {row}", "expected centres are finite and radii finite and positive", received
+            )
 
     @classmethod
     def of(cls, centers: ArrayLike, radii: ArrayLike) -> Spheres:
@@ -82,7 +86,7 @@ class Frame:
     def around(cls, spheres: Spheres, pixels: int, margin: float = 0.08) -> Frame:
         """Frame a heap so that the heap itself, strays aside, is about `pixels` wide."""
         if pixels < 16:
-            raise PictureError("a heap is drawn at least 16 pixels wide", pixels, "pixels")
+            raise PictureError("pixels", "expected a heap is drawn at least 16 pixels wide", pixels)
         middle = np.median(spheres.centers[:, :2], axis=0)
         reach = np.hypot(*(spheres.centers[:, :2] - middle).T) + spheres.radii
         heap_radius = CORE_MARGIN * float(np.quantile(reach, CORE_FRACTION))
@@ -90,8 +94,8 @@ class Frame:
         kept = reach <= half_width
         top = float((spheres.centers[:, 2] + spheres.radii)[kept].max())
         if not 0.0 < top <= TALLEST * heap_radius:
-            rule = f"the heap rises above the plate z = 0, by at most {TALLEST:g} of its radii"
-            raise PictureError(rule, f"{top:.4g} m at a radius of {heap_radius:.4g} m", "centers")
+            rule = f"expected the heap rises above the plate z = 0, by at most {TALLEST:g} of its radii"
+            raise PictureError("centers", rule, f"{top:.4g} m at a radius of {heap_radius:.4g} m")
         return cls(
             axis=(float(middle[0]), float(middle[1])),
             half_width=half_width,

@@ -64,7 +64,9 @@ def levelled(
     position, height = plate.level(columns, rows)
     width = float(np.ptp(position)) if len(position) else 0.0
     if width < MINIMUM_HEAP_WIDTH:
-        raise PictureError(f"a heap is at least {MINIMUM_HEAP_WIDTH} pixels wide", f"{width:.0f}", place)
+        raise PictureError(
+            place, f"expected a heap is at least {MINIMUM_HEAP_WIDTH} pixels wide", f"{width:.0f}"
+        )
     order = np.argsort(position, kind="stable")
     return position[order], np.maximum(height[order], 0.0)
 

@@ -41,11 +41,11 @@ def read_picture(path: str | Path) -> Picture:
         found = "a pipe or a device" if os.path.exists(file) else "no such file"
         if os.path.isdir(file):
             found = "a folder; name what is in it, as FOLDER/*.jpg"
-        raise PictureError("the picture is a regular file", found, str(path))
+        raise PictureError(str(path), "expected the picture is a regular file", found)
     if file.suffix.lower() in HEIC_ENDINGS:
         return _read_heic(file)
     if (length := file.stat().st_size) > LARGEST_FILE:
-        raise PictureError(f"a picture has at most {LARGEST_FILE:,} bytes", f"{length:,}", str(path))
+        raise PictureError(str(path), f"expected a picture has at most {LARGEST_FILE:,} bytes", f"{length:,}")
     # a file that does not tell its size is not decoded: it may have any
     size, picture, content = _claimed_size(file), None, file.read_bytes()
     if size is not None and _holds_its_chunks(content):
@@ -53,7 +53,9 @@ def read_picture(path: str | Path) -> Picture:
         with suppress(cv2.error):
             picture = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
-        raise PictureError("the file is a picture that OpenCV can read", f"{length} bytes", str(path))
+        raise PictureError(
+            str(path), "expected the file is a picture that OpenCV can read", f"{length} bytes"
+        )
     return picture.astype(np.uint8, copy=False)
 
 
@@ -61,21 +63,21 @@ def _read_heic(file: Path) -> Picture:
     try:
         import pillow_heif
     except ImportError:
-        rule = "HEIC is read with pillow-heif (pip install 'dem-warp[heic]'); or save the picture as JPEG"
-        raise PictureError(rule, file.name, str(file)) from None
+        rule = "expected HEIC is read with pillow-heif (pip install 'dem-warp[heic]'); or save the picture as JPEG"
+        raise PictureError(str(file), rule, file.name) from None
     try:
         image = pillow_heif.open_heif(file, convert_hdr_to_8bit=True)
         _check_size(image.size, str(file))
         colors = np.asarray(image)[:, :, :3]
     except (ValueError, OSError, RuntimeError, SyntaxError) as error:
-        raise PictureError("the file is a HEIC picture", str(error), str(file)) from None
+        raise PictureError(str(file), "expected the file is a HEIC picture", str(error)) from None
     return np.ascontiguousarray(colors[:, :, ::-1])
 
 
 def _check_size(size: tuple[int, int], place: str) -> None:
     if size[0] * size[1] > MAXIMUM_PIXELS:
-        rule = f"a picture has at most {MAXIMUM_PIXELS // 10**6} million pixels: save it smaller"
-        raise PictureError(rule, f"{size[0]} x {size[1]}", place)
+        rule = f"expected a picture has at most {MAXIMUM_PIXELS // 10**6} million pixels: save it smaller"
+        raise PictureError(place, rule, f"{size[0]} x {size[1]}")
 
 
 def _claimed_size(file: Path) -> tuple[int, int] | None:
@@ -88,8 +90,8 @@ def _claimed_size(file: Path) -> tuple[int, int] | None:
             with Image.open(file) as image:
                 return image.size
     except Image.DecompressionBombError:
-        rule = f"a picture has at most {MAXIMUM_PIXELS // 10**6} million pixels: save it smaller"
-        raise PictureError(rule, "several times as many", str(file)) from None
+        rule = f"expected a picture has at most {MAXIMUM_PIXELS // 10**6} million pixels: save it smaller"
+        raise PictureError(str(file), rule, "several times as many") from None
     except (UnidentifiedImageError, OSError, ValueError, SyntaxError):
         return None
 
@@ -148,7 +150,7 @@ def save_picture(path: str | Path, image: Picture) -> Path:
         written = False
     if not written:
         raise PictureError(
-            "the ending names a picture format (.png, .jpg, ...)", repr(file.suffix), str(path)
+            str(path), "expected the ending names a picture format (.png, .jpg, ...)", repr(file.suffix)
         )
     file.write_bytes(data.tobytes())
     return file

@@ -101,15 +101,15 @@ def find_plate(top: FloatArray, bottom: FloatArray, place: str, shelf: bool = Tr
     """
     columns = np.flatnonzero(np.isfinite(top))
     if len(columns) < MINIMUM_BODY_WIDTH:
-        rule = f"what stands out of the background is at least {MINIMUM_BODY_WIDTH} pixels wide"
-        raise PictureError(rule, len(columns), place)
+        rule = f"expected what stands out of the background is at least {MINIMUM_BODY_WIDTH} pixels wide"
+        raise PictureError(place, rule, len(columns))
     upper, lower = top[columns], bottom[columns]
     spanning = len(columns) == len(top)
     line = _shelf(columns, upper, lower, spanning) if shelf else None
     line = line or _underside(columns, upper, lower)
     if abs(line.tilt) > MAXIMUM_TILT:
-        rule = f"the plate is level within {MAXIMUM_TILT:g} degrees"
-        raise PictureError(rule, f"{line.tilt:.1f} degrees", place)
+        rule = f"expected the plate is level within {MAXIMUM_TILT:g} degrees"
+        raise PictureError(place, rule, f"{line.tilt:.1f} degrees")
     return line
 
 

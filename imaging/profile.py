@@ -55,7 +55,7 @@ def profile_heights(position: ArrayLike, height: ArrayLike, place: str = "outlin
     x, h = np.asarray(position, dtype=np.float64), np.asarray(height, dtype=np.float64)
     below = np.concatenate([[0.0], np.cumsum(0.5 * (h[1:] + h[:-1]) * np.diff(x))])
     if not 0.0 < below[-1] < np.inf:
-        raise PictureError("an outline has an area", float(below[-1]), place)
+        raise PictureError(place, "expected an outline has an area", float(below[-1]))
     unit = float(np.sqrt(below[-1]))
     middle = float(np.interp(0.5 * below[-1], below, x))
     inner = (np.array(STATIONS) - 0.5 * SPACING) * unit

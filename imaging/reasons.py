@@ -24,7 +24,7 @@ class Doubt:
 
     def __post_init__(self) -> None:
         if self.name not in DOUBTS:
-            raise PictureError(f"a doubt is one of {', '.join(DOUBTS)}", self.name, "doubt")
+            raise PictureError("doubt", f"expected a doubt is one of {', '.join(DOUBTS)}", self.name)
 
     def __str__(self) -> str:
         return f"{self.name}: {self.finding}"

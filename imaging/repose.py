@@ -167,7 +167,7 @@ def compare(a: Angle, b: Angle) -> AngleDifference:
     """
     if a.fit != b.fit:
         raise PictureError(
-            "compared angles were measured with the same fit", f"{a.fit} and {b.fit}", "compare"
+            "compare", "expected compared angles were measured with the same fit", f"{a.fit} and {b.fit}"
         )
     return AngleDifference(a.mean - b.mean, float(np.hypot(a.se, b.se)))
 
@@ -175,6 +175,6 @@ def compare(a: Angle, b: Angle) -> AngleDifference:
 def confidence_interval(angle: Angle, level: float) -> tuple[float, float]:
     """Interval that holds the true mean with probability `level` [degrees], from Student's t."""
     if not 0.0 < level < 1.0:
-        raise PictureError("0 < level < 1", level, "level")
+        raise PictureError("level", "expected 0 < level < 1", level)
     reach = float(special.stdtrit(angle.dof, 0.5 + 0.5 * level)) * angle.se
     return angle.mean - reach, angle.mean + reach

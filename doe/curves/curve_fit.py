@@ -175,10 +175,10 @@ def _check(emulators: Mapping[str, CurveEmulator], curves: Sequence[MeasuredCurv
     for emulator in checked_map("emulators", emulators).values():
         checked_kind("an emulator", emulator, CurveEmulator)
     if not checked_list("curves", curves):
-        raise RuleError("needs a measured curve", "none", "curves")
+        raise RuleError("curves", "needs a measured curve", "none")
     for curve in curves:
         if checked_kind("a measured curve", curve, MeasuredCurve).condition not in emulators:
-            raise RuleError(f"are of conditions {', '.join(emulators)}", curve.condition, "curves")
+            raise RuleError("curves", f"are of conditions {', '.join(emulators)}", curve.condition)
 
 
 def _settings_of(emulators: Mapping[str, CurveEmulator]) -> int:

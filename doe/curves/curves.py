@@ -67,12 +67,12 @@ class CurveEmulator:
         """
         x, rows = np.array(settings, dtype=np.float64), np.array(curves, dtype=np.float64)
         if x.ndim != 2 or rows.ndim != 2 or len(x) != len(rows):
-            raise RuleError("has a row a run", f"shapes {x.shape} and {rows.shape}", "curves")
+            raise RuleError("curves", "has a row a run", f"shapes {x.shape} and {rows.shape}")
         least = x.shape[1] + 1 + LEAST_CURVES
         if len(x) < least:
-            raise RuleError(f"needs {least} runs or more", len(x), "curves")
+            raise RuleError("curves", f"needs {least} runs or more", len(x))
         if not (np.isfinite(x).all() and np.isfinite(rows).all()):
-            raise RuleError("must be finite", "another number", "curves")
+            raise RuleError("curves", "must be finite", "another number")
         mean = rows.mean(axis=0)
         _, sizes, directions = np.linalg.svd(rows - mean, full_matrices=False)
         share = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), np.finfo(float).tiny)

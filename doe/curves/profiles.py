@@ -80,15 +80,15 @@ class ProfileSample:
 
         rows = np.array(profiles, dtype=np.float64)
         if rows.ndim != 2 or len(rows) < LEAST_PROFILES:
-            raise RuleError(f"are rows, {LEAST_PROFILES} or more", f"shape {rows.shape}", "profiles")
+            raise RuleError("profiles", f"are rows, {LEAST_PROFILES} or more", f"shape {rows.shape}")
         if not np.isfinite(rows).all():
             row = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
-            raise RuleError("must be finite", rows[row].tolist(), f"profiles[{row}]")
+            raise RuleError(f"profiles[{row}]", "must be finite", rows[row].tolist())
         mean, count = rows.mean(axis=0), len(rows)
         # of deviations from their own mean; as many degrees of freedom as a standard deviation has
         away = (rows - mean) * np.sqrt(count / (count - 1.0))
         if not np.abs(away).max() > 0.0:
-            raise RuleError("must scatter", "the same one each time", "profiles")
+            raise RuleError("profiles", "must scatter", "the same one each time")
         root = np.eye(rows.shape[1]) if views is None else _root(views, rows.shape[1])
         rounded = np.linalg.solve(root, away.T).T
         scale = rounded.std()
@@ -128,12 +128,12 @@ class ProfileSample:
         changes = np.array(slopes, dtype=np.float64)
         if changes.ndim != 2 or len(changes) != len(self.mean) or not np.isfinite(changes).all():
             rule = f"are finite, a row for each of {len(self.mean)} places"
-            raise RuleError(rule, f"shape {changes.shape}", "slopes")
+            raise RuleError("slopes", rule, f"shape {changes.shape}")
         root = _root(self.covariance, len(self.mean))
         left, values, right = np.linalg.svd(np.linalg.solve(root, changes), full_matrices=False)
         kept = min(count, int(np.count_nonzero(values > LEAST_SPREAD * values[0])))
         if not kept:
-            raise RuleError("must move the profiles", "no change at all", "slopes")
+            raise RuleError("slopes", "must move the profiles", "no change at all")
         found = []
         for direction, setting in zip(np.linalg.solve(root.T, left[:, :kept]).T, right, strict=False):
             weights = direction / np.linalg.norm(direction) * (1.0 if direction.sum() >= 0.0 else -1.0)
@@ -179,7 +179,7 @@ def scatter_of_views(heaps: Sequence[ArrayLike]) -> NDArray[np.float64] | None:
     for views in profiles:
         if views.ndim != 2 or views.shape[1:] != profiles[0].shape[1:] or not np.isfinite(views).all():
             rule = "are finite, a row a view, at the places of the first profile"
-            raise RuleError(rule, f"shape {views.shape}", "views")
+            raise RuleError("views", rule, f"shape {views.shape}")
     several = [views for views in profiles if len(views) > 1]
     if len(several) < LEAST_VIEWED:
         return None
@@ -195,6 +195,6 @@ def _root(covariance: ArrayLike, places: int) -> NDArray[np.float64]:
     """Root R of a covariance R R', no direction of which is quite without scatter."""
     matrix = np.asarray(covariance, dtype=np.float64)
     if matrix.shape != (places, places) or not np.isfinite(matrix).all():
-        raise RuleError(f"is finite, of {places} places", f"shape {matrix.shape}", "covariance")
+        raise RuleError("covariance", f"is finite, of {places} places", f"shape {matrix.shape}")
     variances, directions = np.linalg.eigh(matrix)
     return np.asarray(directions * np.sqrt(np.maximum(variances, LEAST_SPREAD**2 * variances[-1])))

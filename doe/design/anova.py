@@ -79,7 +79,7 @@ def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | Non
     labels of ``coded``, an array by its position; so are labelled blocks.
     """
     if not isinstance(coded, pd.DataFrame) or not len(coded.columns):
-        raise DesignError(f"pure error needs a table of settings, one row an observation, received {coded!r}")
+        raise DesignError(f"pure error needs a table of settings, one row an observation, got {coded!r}")
     values = in_rows("a response", response, coded.index)
     setting = settings_of(coded)
     if blocks is not None:

@@ -119,7 +119,7 @@ class Design:
         if coded is not None:
             checked_flag("coded, unless it is None,", coded)
         if not isinstance(table, pd.DataFrame):
-            raise DesignError(f"a design is made from a DataFrame, received {type(table).__name__}")
+            raise DesignError(f"a design is made from a DataFrame, got {type(table).__name__}")
         blocks = None
         if block is not None:
             if not isinstance(block, str) or block not in table.columns:
@@ -158,7 +158,7 @@ class Design:
     def factor(self, name: str) -> Factor:
         """Return the factor of this name."""
         if not isinstance(name, str):
-            raise DesignError(f"a factor is named by text, received {name!r}")
+            raise DesignError(f"a factor is named by text, got {name!r}")
         for factor in self.factors:
             if factor.name == name:
                 return factor
@@ -182,7 +182,7 @@ class Design:
         """Return the design with these blocks: a label for each run, in the order of the runs."""
         labels = checked_list("blocks", labels)
         if len(labels) != len(self.coded):
-            raise DesignError(f"blocks: one label for each of {len(self.coded)} runs, received {len(labels)}")
+            raise DesignError(f"blocks: one label for each of {len(self.coded)} runs, got {len(labels)}")
         blocks = pd.Series(labels, index=self.coded.index)
         return replace(self, blocks=blocks)
 
@@ -211,7 +211,7 @@ def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.
     values = aligned("a response", response, design.coded.index)
     runs = len(design.coded)
     if values.ndim not in (1, 2) or values.shape[0] != runs or values.size == 0:
-        raise DesignError(f"a response has shape ({runs},) or ({runs}, replicates), received {values.shape}")
+        raise DesignError(f"a response has shape ({runs},) or ({runs}, replicates), got {values.shape}")
     values = values.reshape(runs, -1)
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
@@ -295,9 +295,9 @@ def _checked_table(table: pd.DataFrame, names: list[str], dummies: tuple[str, ..
             raise DesignError(f"no column for {what} {missing[0]!r}; the table has {list(table.columns)}")
     for what, labels in (("run label", table.index), ("column", table.columns)):
         if labels.has_duplicates:
-            raise DesignError(f"each {what} comes once, received again: {labels[labels.duplicated()][0]}")
+            raise DesignError(f"each {what} comes once, got again: {labels[labels.duplicated()][0]}")
     if table.empty:
-        raise DesignError("a design has at least one run, received an empty table")
+        raise DesignError("a design has at least one run, got an empty table")
     strangers = [name for name in table.columns if name not in (*names, *dummies)]
     if strangers:
         raise DesignError(

@@ -42,7 +42,7 @@ class Factor:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
-            raise DesignError(f"a factor's name is text, received {self.name!r}")
+            raise DesignError(f"a factor's name is text, got {self.name!r}")
         if not self.name or self.name != self.name.strip() or set(self.name) & set(":^"):
             raise DesignError(f"a factor's name is not empty, has no outer blanks, ':' or '^': {self.name!r}")
         if self.name in RESERVED_NAMES:
@@ -52,13 +52,9 @@ class Factor:
         for place in ("low", "high"):
             value = getattr(self, place)
             if not isinstance(value, numbers.Real) or not math.isfinite(value):
-                raise DesignError(
-                    f"factor {self.name!r}: {place} must be finite, received {getattr(self, place)}"
-                )
+                raise DesignError(f"factor {self.name!r}: {place} must be finite, got {getattr(self, place)}")
         if not self.low < self.high:
-            raise DesignError(
-                f"factor {self.name!r}: low must be below high, received {self.low} and {self.high}"
-            )
+            raise DesignError(f"factor {self.name!r}: low must be below high, got {self.low} and {self.high}")
 
     @classmethod
     def around(cls, name: str, center: float, half_range: float, unit: str = "") -> "Factor":
@@ -117,9 +113,7 @@ class Category(Factor):
         super().__post_init__()
         levels = tuple(self.levels) if isinstance(self.levels, Iterable) else ()
         if isinstance(self.levels, str) or len(levels) < 2 or len(set(levels)) < len(levels):
-            raise DesignError(
-                f"category {self.name!r}: two or more different levels, received {self.levels!r}"
-            )
+            raise DesignError(f"category {self.name!r}: two or more different levels, got {self.levels!r}")
         object.__setattr__(self, "levels", levels)
 
     @property
@@ -143,9 +137,7 @@ class Category(Factor):
     def _translated(self, values: Any, table: dict) -> Any:
         strangers = [value for value in np.ravel(values) if value not in table]
         if strangers:
-            raise DesignError(
-                f"category {self.name!r} has the levels {list(table)}, received {strangers[0]!r}"
-            )
+            raise DesignError(f"category {self.name!r} has the levels {list(table)}, got {strangers[0]!r}")
         if hasattr(values, "map"):  # a column of a table
             return values.map(table)
         found = np.array([table[value] for value in np.ravel(values)])
@@ -176,15 +168,15 @@ def two_level_factors(factors: Iterable[Factor], what: str) -> tuple[Factor, ...
 def checked_factors(factors: Iterable[Factor]) -> tuple[Factor, ...]:
     """Return the factors as a tuple; raise DesignError when empty, no factors, or when a name comes twice."""
     if not isinstance(factors, Iterable) or isinstance(factors, str | bytes):
-        raise DesignError(f"factors is a list of Factor or Category, received {factors!r}")
+        raise DesignError(f"factors is a list of Factor or Category, got {factors!r}")
     factors = tuple(factors)
     for factor in factors:
         if not isinstance(factor, Factor | Category):
-            raise DesignError(f"factors is a list of Factor or Category, received {factor!r} in it")
+            raise DesignError(f"factors is a list of Factor or Category, got {factor!r} in it")
     if not factors:
-        raise DesignError("a design needs at least one factor, received none")
+        raise DesignError("a design needs at least one factor, got none")
     names = [factor.name for factor in factors]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise DesignError(f"factor names must differ, received twice: {', '.join(twice)}")
+        raise DesignError(f"factor names must differ, got twice: {', '.join(twice)}")
     return factors

@@ -54,7 +54,7 @@ def in_rows(name: str, values: ArrayLike, rows: pd.Index) -> pd.Series:
     else:
         numbers = real_array(name, values)
     if numbers.shape != (len(rows),):
-        raise DesignError(f"{name} is one number a row of {len(rows)}, received shape {numbers.shape}")
+        raise DesignError(f"{name} is one number a row of {len(rows)}, got shape {numbers.shape}")
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         raise DesignError(f"{name} must be finite: {numbers[bad[0]]} in row {_text(rows[bad[0]])}")

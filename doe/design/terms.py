@@ -50,12 +50,12 @@ def parsed_terms(written: Iterable[str], names: Sequence[str]) -> tuple[Term, ..
     terms: list[Term] = []
     for text in checked_list("model, unless it is a name,", written):
         if not isinstance(text, str):
-            raise DesignError(f"a term is text such as 'A:B' or 'A^2', received {text!r}")
+            raise DesignError(f"a term is text such as 'A:B' or 'A^2', got {text!r}")
         base, power, degree = text.partition("^")
         parts = [part.strip() for part in base.split(":")]
         if power:
             if len(parts) > 1 or not degree.strip().isdigit() or not 2 <= int(degree) <= HIGHEST_POWER:
-                raise DesignError(f"a term is a product or one power, such as A:B or A^2; received {text!r}")
+                raise DesignError(f"a term is a product or one power, such as A:B or A^2, got {text!r}")
             parts *= int(degree)
         strangers = [part for part in parts if part not in names]
         if strangers:
@@ -84,7 +84,7 @@ def term_name(term: Term) -> str:
 def find_term(name: str, terms: Iterable[Term]) -> Term:
     """Return the term that a name writes (interactions in either order); raise DesignError when none does."""
     if not isinstance(name, str):
-        raise DesignError(f"a term is named by text such as 'E', 'E:F' or 'E^2', received {name!r}")
+        raise DesignError(f"a term is named by text such as 'E', 'E:F' or 'E^2', got {name!r}")
     for term in terms:
         if name == term_name(term) or sorted(str(name).split(":")) == sorted(term):
             return term

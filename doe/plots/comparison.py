@@ -62,7 +62,7 @@ def agreement_plot(
     checked_kind("result", result, Agreement)
     groups = checked_list("groups", groups)
     if len(groups) != result.runs:
-        raise DesignError(f"groups: a name for each of {result.runs} runs, received {len(groups)}")
+        raise DesignError(f"groups: a name for each of {result.runs} runs, got {len(groups)}")
     figure, axes = canvas(axes, 4.6)
     ends = [
         min(result.response.min(), result.reference.min()),

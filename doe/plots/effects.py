@@ -81,7 +81,7 @@ def interaction_plot(
     Parallel lines: the two do not interact.
     """
     if checked_kind("x", x, str) == checked_kind("trace", trace, str):
-        raise DesignError(f"an interaction is that of two different factors, received {x!r} twice")
+        raise DesignError(f"an interaction is that of two different factors, got {x!r} twice")
     figure, axes = canvas(axes, 3.6)
     table = level_means(design, response, x, trace).reset_index().pivot_table("mean", x, trace)
     numeric = not isinstance(design.factor(x), Category)
@@ -123,7 +123,7 @@ def cube_plot(
     names = surface.design.names[:3] if factors is None else checked_list("factors", factors)
     chosen = [surface.design.factor(name) for name in names]
     if len(set(names)) != 3 or len(names) != 3:
-        raise DesignError(f"a cube has three different factors, received {names}")
+        raise DesignError(f"a cube has three different factors, got {names}")
     centers = {
         factor.name: factor.to_natural(factor.codes[0] if isinstance(factor, Category) else 0.0)
         for factor in surface.design.factors

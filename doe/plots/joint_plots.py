@@ -61,7 +61,7 @@ def joint_plot(
     else:
         panels = checked_list("axes", axes)
         if len(panels) != len(pairs):
-            raise DesignError(f"axes: one for each of {len(pairs)} pairs of factors, received {len(panels)}")
+            raise DesignError(f"axes: one for each of {len(pairs)} pairs of factors, got {len(panels)}")
         figure, _ = canvas(panels[0], 0.0)
     bands = {name: fit.band(name) for name in fit.goals}
     for panel, (x, y) in zip(panels, pairs, strict=True):

@@ -50,7 +50,7 @@ def overlay_plot(
         )
     for name, pair in limits.items():
         if not isinstance(pair, tuple | list) or len(pair) != 2:
-            raise DesignError(f"the limits of {name!r} are (low, high), None where free: received {pair!r}")
+            raise DesignError(f"the limits of {name!r} are (low, high), None where free, got {pair!r}")
         for limit in pair:
             if limit is not None:
                 checked_number(f"a limit of {name!r}", limit)

@@ -93,7 +93,7 @@ def surface_grid(
         for name, fallback in zip((x, y), design.names, strict=False)
     )
     if x_factor == y_factor:
-        raise DesignError(f"a surface is drawn over two different factors, received {x_factor.name!r} twice")
+        raise DesignError(f"a surface is drawn over two different factors, got {x_factor.name!r} twice")
     centers = {factor.name: factor.center for factor in design.factors}
     held = checked_setting("at", centers | ({} if at is None else checked_map("at", at)), design)
     line = np.linspace(-extent, extent, resolution)

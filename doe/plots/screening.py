@@ -52,7 +52,7 @@ def half_normal_plot(
 ) -> Figure:
     """Draw the half-normal plot of all effects; hollow points are dummies, the line is the test's error."""
     if not isinstance(result, ScreenResult | TwoLevelEffects):
-        raise DesignError(f"result must be a ScreenResult or TwoLevelEffects, received {result!r}")
+        raise DesignError(f"result must be a ScreenResult or TwoLevelEffects, got {result!r}")
     points = half_normal_points(result.effects)
     figure, axes = canvas(axes, 3.8)
     dummy = points.index.isin(result.design.dummies)

@@ -15,7 +15,7 @@ def canvas(axes: Axes | None, height: float) -> tuple[Figure, Axes]:
     if axes is not None:
         figure = axes.get_figure(root=True)
         if figure is None:
-            raise ValueError("axes to draw on belong to a figure, received axes without one")
+            raise ValueError("axes to draw on belong to a figure, got axes without one")
         return figure, axes
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     return figure, figure.subplots()

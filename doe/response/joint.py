@@ -42,11 +42,11 @@ class Goal:
     def __post_init__(self) -> None:
         for place, wanted in (("design", "a fitted surface"), ("evaluate", "a fitted surface")):
             if not hasattr(self.surface, place):
-                raise DesignError(f"a goal's surface is {wanted}, received {self.surface!r}")
+                raise DesignError(f"a goal's surface is {wanted}, got {self.surface!r}")
         if not isinstance(self.target, Sample):
-            raise DesignError(f"a goal's target is a Sample (mean, sd, n), received {self.target!r}")
+            raise DesignError(f"a goal's target is a Sample (mean, sd, n), got {self.target!r}")
         if not self.target.sd > 0.0:
-            raise DesignError(f"a response is weighed by its target's spread, received {self.target}")
+            raise DesignError(f"a response is weighed by its target's spread, got {self.target}")
 
     @property
     def fit(self) -> FittedSurface:
@@ -361,10 +361,10 @@ def joint_fit(goals: Mapping[str, Goal], alpha: float = 0.05, resolution: int | 
     """
     if not isinstance(goals, Mapping) or not goals:
         received = "none" if isinstance(goals, Mapping) else repr(goals)
-        raise DesignError(f"a joint fit needs at least one response by its name, received {received}")
+        raise DesignError(f"a joint fit needs at least one response by its name, got {received}")
     for name, goal in goals.items():
         if not isinstance(goal, Goal):
-            raise DesignError(f"response {name!r} of a joint fit is a Goal, received {goal!r}")
+            raise DesignError(f"response {name!r} of a joint fit is a Goal, got {goal!r}")
     checked_level(alpha)
     if resolution is not None:
         checked_count("resolution", resolution)

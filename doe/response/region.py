@@ -92,7 +92,7 @@ class Region:
         names = [factor.name for factor in self.factors]
         unknown = [name for name in (x, y) if name not in names]
         if unknown or x == y:
-            raise DesignError(f"a projection takes two of {', '.join(names)}, received {x!r} and {y!r}")
+            raise DesignError(f"a projection takes two of {', '.join(names)}, got {x!r} and {y!r}")
         return self.mask.reshape((self.resolution,) * len(names)), names
 
     @property

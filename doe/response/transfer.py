@@ -230,14 +230,14 @@ def transfer(
     table = coded_points(source.design.factors, pd.DataFrame(natural))
     points = pd.DataFrame(table)[source.design.names].to_numpy(dtype=np.float64)
     if values.shape != (len(points),):
-        raise DesignError(f"{len(points)} runs need one response each, received the shape {values.shape}")
+        raise DesignError(f"{len(points)} runs need one response each, got the shape {values.shape}")
     if len(points) < LEAST_RUNS:
-        raise DesignError(f"a surface is carried over by {LEAST_RUNS} runs or more, received {len(points)}")
+        raise DesignError(f"a surface is carried over by {LEAST_RUNS} runs or more, got {len(points)}")
     if not (np.isfinite(values).all() and np.isfinite(points).all()):
-        raise DesignError("runs and responses must be finite, received others")
+        raise DesignError("runs and responses must be finite, got others")
     distance = np.abs(checked_number("the level", level) - values).max()
     if distance > FARTHEST * max(float(np.ptp(values)), float(np.ptp(source.fitted))):
-        raise DesignError(f"the level lies among the responses or near them, received {level:g}")
+        raise DesignError(f"the level lies among the responses or near them, got {level:g}")
     checked_df("scale_sd, the standard deviation of the scale,", scale_sd)
     found = Transfer(source, float(level), points, values, 1.0, 1.0, scale_sd)
     if np.ptp(found._columns(points)[:, 1]) <= 1e-9 * max(1.0, float(np.ptp(source.fitted))):

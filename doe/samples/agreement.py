@@ -235,17 +235,17 @@ def agreement(
     first, second = real_array("values", values), real_array("reference", reference)
     if first.ndim != 1 or first.shape != second.shape or len(first) < 3:
         raise DesignError(
-            f"agreement needs values and reference of the same 3 or more runs, received shapes {first.shape} "
+            f"agreement needs values and reference of the same 3 or more runs, got shapes {first.shape} "
             f"and {second.shape}"
         )
     if not (np.isfinite(first).all() and np.isfinite(second).all()):
         raise DesignError("agreement needs finite values and reference: leave out the runs that lack one")
     own = real_array("value_variance", value_variance)
     if own.shape not in ((), (1,), first.shape):
-        raise DesignError(f"value_variance is one number or one a run, received shape {own.shape}")
+        raise DesignError(f"value_variance is one number or one a run, got shape {own.shape}")
     variance = np.broadcast_to(own, first.shape)
     if not ((variance >= 0.0) & np.isfinite(variance)).all():
-        raise DesignError(f"noise variances must be 0 or more, received {value_variance!r}")
+        raise DesignError(f"noise variances must be 0 or more, got {value_variance!r}")
     noise = checked_number(
         "reference_variance: noise variances must be 0 or more: it", reference_variance, least=0.0
     )
@@ -266,7 +266,7 @@ def _numbers(labels: ArrayLike, runs: int, name: str) -> NDArray[np.int_]:
     """Return for every label the number of its kind."""
     given = np.asarray(labels, dtype=object)
     if given.shape != (runs,):
-        raise DesignError(f"{name} must be a label for each of {runs} runs, received shape {given.shape}")
+        raise DesignError(f"{name} must be a label for each of {runs} runs, got shape {given.shape}")
     if pd.isna(given).any():
         raise DesignError(
             f"{name} must be a label for each run: that of run {int(pd.isna(given).argmax()) + 1} is missing"

@@ -125,7 +125,7 @@ def compare_means(
     if margin is not None:
         margin = checked_number("an equivalence margin", margin)
         if not margin > 0.0:
-            raise DesignError(f"an equivalence margin must be positive, received {margin:g}")
+            raise DesignError(f"an equivalence margin must be positive, got {margin:g}")
     if checked_level(alpha) >= 0.5 and margin is not None:
         raise DesignError(f"the level of a test of equivalence lies below 0.5: alpha is {alpha}")
     first = Sample.of(a)
@@ -133,11 +133,11 @@ def compare_means(
         if isinstance(b, Sample) or np.ndim(b) > 0:
             raise DesignError(
                 "method='one-sample' compares with a known number, and a sample has an error of its own: "
-                f"give its mean where that error is to be ignored, or choose another method; received {b!r}"
+                f"give its mean where that error is to be ignored, or choose another method, got {b!r}"
             )
         second: Sample | float = checked_number("the number to compare with", b)
     elif isinstance(b, numbers.Real):
-        raise DesignError(f"a plain number has no spread: give a sample or method='one-sample', received {b}")
+        raise DesignError(f"a plain number has no spread: give a sample or method='one-sample', got {b}")
     else:
         second = Sample.of(b)
     se, df = _difference_error(first, second, method)

@@ -115,7 +115,7 @@ def detectable_effect(
 ) -> float:
     """Return the smallest effect that is found with a given power (see ``effect_power``)."""
     if not checked_level(alpha) < checked_number("power", power) < 1.0:
-        raise DesignError(f"power lies between alpha ({alpha}) and 1, received {power}")
+        raise DesignError(f"power lies between alpha ({alpha}) and 1, got {power}")
     checked_count("observations", observations)
     for name, value in (("sd", sd), ("error_df", error_df)):
         checked_number(name, value, above=0.0)

@@ -80,12 +80,12 @@ def steepest_path(
         first step over the top of a quadratic.
     """
     if not isinstance(fit, ScreenResult | Surface):
-        raise DesignError(f"a path starts from a ScreenResult or a Surface, received {fit!r}")
+        raise DesignError(f"a path starts from a ScreenResult or a Surface, got {fit!r}")
     steps = checked_count("steps of a path", steps, most=MOST)
     chosen = fit.design.names if factors is None else checked_list("factors", factors)
     moving = [fit.design.factor(name) for name in chosen]
     if not moving:
-        raise DesignError("a path moves at least one factor, received none")
+        raise DesignError("a path moves at least one factor, got none")
     names = [factor.name for factor in moving]
     start = {} if start is None else checked_map("start", start)
     limits = {} if limits is None else checked_map("limits", limits)
@@ -179,7 +179,7 @@ def _walk(
     pairs = [real_array(f"the limits of {name!r}", limits.get(name, (-np.inf, np.inf))) for name in names]
     for name, pair in zip(names, pairs, strict=True):
         if pair.shape != (2,):
-            raise DesignError(f"the limits of {name!r} are a low and a high value, received {limits[name]!r}")
+            raise DesignError(f"the limits of {name!r} are a low and a high value, got {limits[name]!r}")
     low, high = np.array(pairs).T
     for name, value, bottom, top in zip(names, begin, low, high, strict=True):
         if not bottom <= value <= top:

@@ -102,7 +102,7 @@ def two_level_effects(design: Design, response: ArrayLike, order: int | None = N
             "effects fall partly onto one another here: use screen, or fit_surface with some terms"
         )
     if len(rows) < 5:
-        raise DesignError(f"Lenth's method takes five or more effects, received {len(rows)}")
+        raise DesignError(f"Lenth's method takes five or more effects, got {len(rows)}")
     effects = 2.0 * columns.T @ y / len(coded)
     error = float(pseudo_error(effects[None, :])[0])
     if not error > 1e-12 * np.abs(effects).max():

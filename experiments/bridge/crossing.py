@@ -53,14 +53,14 @@ def check_order(source: Source, runs: int, fresh: int, margin: float | None) -> 
         With too few runs or fresh runs, or a margin that is not positive or must be stated.
     """
     if runs < LEAST_RUNS:
-        raise InputError(f"a bridge needs {LEAST_RUNS} runs or more", runs, "--runs")
+        raise InputError("--runs", f"a bridge needs {LEAST_RUNS} runs or more", runs)
     if fresh < 2:
-        raise InputError("a mean with a spread needs 2 fresh runs or more", fresh, "--fresh")
+        raise InputError("--fresh", "a mean with a spread needs 2 fresh runs or more", fresh)
     if margin is None and source.unit != "deg":
-        raise InputError(f"must be stated for a response in {source.unit}", "none", "--margin")
+        raise InputError("--margin", f"must be stated for a response in {source.unit}", "none")
     margin = DEGREES_WITHIN if margin is None else margin
     if not (np.isfinite(margin) and margin > 0.0):
-        raise InputError("must be a positive number", margin, "--margin")
+        raise InputError("--margin", "must be a positive number", margin)
     return margin
 
 

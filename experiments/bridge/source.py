@@ -48,17 +48,17 @@ def read_source(path: Path) -> Source:
     _, card = read_toml(path, "a material card")
     own = load_card(path)
     if BRIDGE in card:
-        rule = "a bridge starts from a card that dem-warp calibrate wrote, not from one that is corrected"
-        raise StudyError(rule, card[BRIDGE].get("engine", "a corrected one"), f"{path}: {BRIDGE}")
+        rule = "expected a bridge starts from a card that dem-warp calibrate wrote, not from one that is corrected"
+        raise StudyError(f"{path}: {BRIDGE}", rule, card[BRIDGE].get("engine", "a corrected one"))
     surfaces = card_surfaces(card, path)
     if len(surfaces) != 1:
-        rule = "a bridge corrects the surface of one response, which the card has in [surface.NAME]"
-        raise StudyError(rule, ", ".join(surfaces) or "none", f"{path}: {SURFACE}")
+        rule = "expected a bridge corrects the surface of one response, which the card has in [surface.NAME]"
+        raise StudyError(f"{path}: {SURFACE}", rule, ", ".join(surfaces) or "none")
     [(response, surface)] = surfaces.items()
     facts = card.get("fitted", {}).get("response", {}).get(response, {})
     if facts.get("scene", "target") != "target":
-        rule = "a bridge runs the card's own test, and its response is that of a further scene"
-        raise StudyError(rule, facts["scene"], f"{path}: fitted.response.{response}")
+        rule = "expected a bridge runs the card's own test, and its response is that of a further scene"
+        raise StudyError(f"{path}: fitted.response.{response}", rule, facts["scene"])
     target, unit = _target(facts, f"{path}: fitted.response.{response}")
     chosen = {name: card["factor"][name]["chosen"] for name in surface.design.names}
     study = _with_factors(own, card, surface)
@@ -70,8 +70,8 @@ def _target(facts: dict[str, Any], place: str) -> tuple[Sample, str]:
         mean, sd = (Quantity.parse(facts[name]) for name in ("mean", "sd"))
         return Sample(mean.number, sd.number, facts["n"]), mean.unit or "1"
     except (DesignError, KeyError, ValueError) as error:
-        rule = "a card says what was measured: mean, sd and n, and of which observable"
-        raise StudyError(rule, f"{type(error).__name__}: {error}", place) from None
+        rule = "expected a card says what was measured: mean, sd and n, and of which observable"
+        raise StudyError(place, rule, f"{type(error).__name__}: {error}") from None
 
 
 def _with_factors(study: Study, card: dict[str, Any], surface: Surface) -> Study:

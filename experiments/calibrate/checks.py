@@ -18,13 +18,13 @@ def check_calibration(study: Study) -> None:
         When it has none, or one does not fit.
     """
     if not study.factors:
-        raise StudyError("a calibration needs at least one [[factor]]", "none", str(study.file))
+        raise StudyError(str(study.file), "a calibration needs at least one [[factor]]", "none")
     try:
         check_study(study)
     except InputError:
         raise
     except ValueError as error:
-        raise StudyError("the decisions must fit the factors", str(error), str(study.file)) from error
+        raise StudyError(str(study.file), "the decisions must fit the factors", str(error)) from error
 
 
 def check_study(study: Study) -> None:
@@ -48,13 +48,13 @@ def check_study(study: Study) -> None:
         _check_values(sizes, positive, f"campaign.{place}")
         for name, size in (sizes or {}).items():
             if not size > 0.0:
-                raise ValueError(f"campaign.{place}.{name}: must be positive (received {size:g})")
+                raise ValueError(f"campaign.{place}.{name}: must be positive, got {size:g}")
     if study.target.twin is not None:
         _check_values(study.target.twin.truth, hard, "target.twin.truth")
     leading = study.target.leading
     if settings.verification.margin is not None and leading.unit != "deg":
         rule = f"is an angle, but {leading.name} leads: state margin_sds instead"
-        raise ValueError(f"campaign.verification.margin: {rule} (received {settings.verification.margin:g})")
+        raise ValueError(f"campaign.verification.margin: {rule}, got {settings.verification.margin:g}")
     # the designs load the libraries of statistics: what can be said without them is said before
     from experiments.calibrate.screening import screening_design
 
@@ -63,7 +63,7 @@ def check_study(study: Study) -> None:
 
 def _check_name(name: str, known: Mapping[str, object], place: str) -> None:
     if name not in known:
-        raise ValueError(f"{place}: must name a factor, one of {', '.join(known)} (received {name!r})")
+        raise ValueError(f"{place}: must name a factor, one of {', '.join(known)}, got {name!r}")
 
 
 def _check_values(
@@ -73,4 +73,4 @@ def _check_values(
         _check_name(name, limits, place)
         low, high = limits[name]
         if not low <= value <= high:
-            raise ValueError(f"{place}.{name}: must lie within {low:g} and {high:g} (received {value:g})")
+            raise ValueError(f"{place}.{name}: must lie within {low:g} and {high:g}, got {value:g}")

@@ -78,7 +78,7 @@ def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study
     scales = read_toml(path)[1].get("scale", {}) if path is not None else {}
     if path is not None and scale is not None and isinstance(scales, dict) and scale not in scales:
         named = ", ".join(scales) or "none"
-        raise StudyError(f"the scale must be one that the study has, known: {named}", scale, str(path))
+        raise StudyError(str(path), f"the scale must be one that the study has, known: {named}", scale)
     # now the sections of a study, which need pydantic and numpy
     from experiments.studyfile import load_study, study_scales
 

@@ -90,7 +90,7 @@ def assignments(texts: list[str]) -> dict[str, str]:
     pairs = [text.partition("=") for text in texts]
     for text, (name, equals, value) in zip(texts, pairs, strict=True):
         if not (name.strip() and equals and value.strip()):
-            raise InputError("needs NAME=VALUE, for example E=0.48", text, "--set")
+            raise InputError("--set", "needs NAME=VALUE, for example E=0.48", text)
     return {name.strip(): value.strip() for name, _, value in pairs}
 
 
@@ -102,7 +102,7 @@ def quantity(text: str, dimension: str, option: str) -> float:
     try:
         return Quantity.parse(text).to_base(dimension)
     except ValueError as error:
-        raise InputError(str(error), text, option) from None
+        raise InputError(option, str(error), text) from None
 
 
 def share(text: str, option: str) -> float:
@@ -115,5 +115,5 @@ def share(text: str, option: str) -> float:
     except ValueError:
         value = 0.0
     if not 0.0 < value < 1.0:
-        raise InputError("must be a share above 0 and below 1, as 5% or 0.05", text, option)
+        raise InputError(option, "must be a share above 0 and below 1, as 5% or 0.05", text)
     return value

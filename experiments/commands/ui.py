@@ -35,7 +35,7 @@ def ui(
 
         chosen = (folder or Path()).absolute()
         if not chosen.is_dir():
-            raise InputError("must be a folder to work in", "no folder of this name", str(folder))
+            raise InputError(str(folder), "must be a folder to work in", "no folder of this name")
         place = Place.open(port)
         messages.print(f"Working in {chosen}. Open this address; Ctrl-C ends it:")
         typer.echo(place.url)

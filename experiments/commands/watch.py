@@ -37,7 +37,7 @@ def watch(
 
         require_libraries()
         if not folder.is_dir():
-            raise InputError("must be the folder of a run", "no folder of this name", str(folder))
+            raise InputError(str(folder), "must be the folder of a run", "no folder of this name")
         place = Place.open(port)
         messages.print(f"Watching {folder}. Open this address; Ctrl-C ends it:")
         typer.echo(place.url)

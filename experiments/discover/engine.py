@@ -95,7 +95,7 @@ class EngineSimulator:
                 cases[keys[-1]] = case
             except StudyError as error:
                 keys.append(f"refused: {error}")
-                refused[keys[-1]] = (np.full(len(self.observables), np.nan), error.rule)
+                refused[keys[-1]] = (np.full(len(self.observables), np.nan), error.problem)
         found = self.table.load(list(cases)) | refused
         found |= self._runner.run({key: case for key, case in cases.items() if key not in found})
         values = np.array([found[key][0] for key in keys]).reshape(len(keys), len(self.observables))

@@ -161,15 +161,15 @@ def with_maximum(study: Study, mechanism: Mechanism, size: Quantity) -> Mechanis
     try:
         maximum = _in_unit(mechanism.parameters[0], size, mechanism.unit)
     except ValueError as error:
-        raise StudyError(str(error), str(size), place) from error
+        raise StudyError(place, str(error), str(size)) from error
     if maximum <= mechanism.null:
-        raise StudyError(f"must be above {mechanism.null:g}, where it has no effect", str(size), place)
+        raise StudyError(place, f"must be above {mechanism.null:g}, where it has no effect", str(size))
     changed = replace(mechanism, maximum=maximum)
     try:
         with_mechanisms(study, [changed])
     except StudyError as error:
-        rule = f"must be a size that the study can have: {error.rule}"
-        raise StudyError(rule, str(size), place) from error
+        rule = f"must be a size that the study can have: {error.problem}"
+        raise StudyError(place, rule, str(size)) from error
     return changed
 
 

@@ -61,10 +61,12 @@ class Search:
         """
         file = str(study.file)
         if not study.factors:
-            raise StudyError("a search calibrates first, so it needs at least one [[factor]]", "none", file)
+            raise StudyError(file, "a search calibrates first, so it needs at least one [[factor]]", "none")
         if all(condition.held_out for condition in study.conditions):
             names = ", ".join(condition.name for condition in study.conditions)
-            raise StudyError("at least one condition takes part in the fit", f"held out: {names}", file)
+            raise StudyError(
+                file, "expected at least one condition takes part in the fit", f"held out: {names}"
+            )
         settings = settings_of(study.discover.settings, f"{file}: discover.settings")
         return cls(study, _wanted(study), settings)
 
@@ -128,9 +130,9 @@ class Search:
             rule = (
                 "must be the bank of this study, at this scale: the same grain, test, factors and conditions"
             )
-            raise InputError(rule, "another study's", str(path))
+            raise InputError(str(path), rule, "another study's")
         if not any(mechanism in mine.mechanisms for mechanism in its.mechanisms):
-            raise InputError("must hold a mechanism that is looked for", ", ".join(its.names), str(path))
+            raise InputError(str(path), "must hold a mechanism that is looked for", ", ".join(its.names))
         return bank
 
     def analysis(self, measured: Measured, bank: Bank, seed: int) -> Analysis:
@@ -157,13 +159,13 @@ def _up_to_date(bank: Bank, space: SearchSpace) -> Bank:
 def _wanted(study: Study) -> tuple[Mechanism, ...]:
     library = {mechanism.name: mechanism for mechanism in library_for(study)}
     if not library:
-        raise StudyError("a search needs a mechanism that the study can have", "none", str(study.file))
+        raise StudyError(str(study.file), "a search needs a mechanism that the study can have", "none")
     names = [FORMER_NAMES.get(name, name) for name in study.discover.mechanisms or ()]
     maxima = {FORMER_NAMES.get(name, name): size for name, size in study.discover.maxima.items()}
     for key, named in (("mechanisms", names), ("maxima", maxima)):
         for name in named:
             if name not in library:
                 rule = f"must name mechanisms that the study can have, {nearest_name(name, list(library))}"
-                raise StudyError(rule, name, f"{study.file}: discover.{key}")
+                raise StudyError(f"{study.file}: discover.{key}", rule, name)
     library |= {name: with_maximum(study, library[name], size) for name, size in maxima.items()}
     return tuple(library[name] for name in sorted(names or library))

@@ -30,8 +30,8 @@ class ExportedTest:
 
     def __post_init__(self) -> None:
         if parts := [part.name for part in self.case.wall_parts]:
-            rule = "the walls of a test that leaves for another code are all of one material"
-            raise InputError(rule, f"others for {', '.join(parts)}", self.source)
+            rule = "expected the walls of a test that leaves for another code are all of one material"
+            raise InputError(self.source, rule, f"others for {', '.join(parts)}")
 
 
 @dataclass(frozen=True)

@@ -40,11 +40,11 @@ def export_input(
     """
     known = {name: each.translate for name, each in EXPORTERS.items() if each.translate is not None}
     if to not in known:
-        raise InputError(f"must be one of {', '.join(known)}", to, "--to")
+        raise InputError("--to", f"must be one of {', '.join(known)}", to)
     translation = known[to](test)
     if translation.warnings and not approximate:
         rule = f"{EXPORTERS[to].code} must have all of the test, or {option} takes the nearest that it has"
-        raise InputError.of(Problem(rule, warning, test.source) for warning in translation.warnings)
+        raise InputError.of(Problem(test.source, rule, warning) for warning in translation.warnings)
     return translation
 
 

@@ -85,7 +85,7 @@ class Lift:
         scene = self.test.case.scene
         if not isinstance(scene, LiftedCylinder):
             rule = "the test must be a lifted-cylinder, the only one that is exported"
-            raise InputError(rule, getattr(scene, "name", type(scene).__name__), self.test.source)
+            raise InputError(self.test.source, rule, getattr(scene, "name", type(scene).__name__))
 
     @property
     def case(self) -> Case[LiftedCylinder]:

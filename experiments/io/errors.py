@@ -1,18 +1,15 @@
-"""Bad input: each error gives the rule, the value received and the place."""
+"""Bad input: each error has a place, a problem, the value received and a hint."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
-LONGEST_VALUE, LONGEST_RULE = 120, 600
-"""Characters of a value and of a rule that a message shows: a value may be a file of megabytes."""
+LONGEST_VALUE, LONGEST_PROBLEM = 120, 600
+"""Characters of a value and of a problem that a message shows: a value may be a file of megabytes."""
 MOST_PROBLEMS = 20
-"""Problems that a message tells of."""
-_DEMAND = re.compile(r"^(?:is|has|names|takes)\b|\b(?:must|needs?|required|unknown|never|only|not both)\b")
-"""A rule in these words cannot be taken for what was found."""
+"""Problems that a message lists."""
 
 
 def shortened(text: str, most: int = LONGEST_VALUE) -> str:
@@ -25,40 +22,45 @@ def shortened(text: str, most: int = LONGEST_VALUE) -> str:
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong."""
+    """One thing that is wrong: ``place: problem, got value. hint``."""
 
-    rule: str
-    """Rule that must hold, in words."""
-    value: str
-    """Value received instead."""
     place: str
     """File, line and key, or the name of the option."""
+    problem: str
+    """Rule that is broken, as a statement about the place."""
+    value: str = ""
+    """Value received; empty where the problem says it."""
+    hint: str = ""
+    """What to do about it, as a sentence."""
 
     def __str__(self) -> str:
-        rule = self.rule if _DEMAND.search(self.rule) else f"expected: {self.rule}"
-        return f"{self.place}: {shortened(rule, LONGEST_RULE)} (received {shortened(self.value)})"
+        got = f", got {shortened(self.value)}" if self.value else ""
+        hint = f". {self.hint}" if self.hint else ""
+        return f"{self.place}: {shortened(self.problem, LONGEST_PROBLEM)}{got}{hint}"
 
 
 class InputError(ValueError):
-    """Bad input, found before anything runs; rule, value and place are those of its first problem."""
+    """Bad input, found before anything runs; its attributes are those of its first problem."""
 
-    def __init__(self, rule: str, value: object, place: str, more: tuple[Problem, ...] = ()) -> None:
-        self.rule, self.place = rule, place
+    def __init__(
+        self, place: str, problem: str, value: object = "", hint: str = "", more: tuple[Problem, ...] = ()
+    ) -> None:
+        self.place, self.problem, self.hint = place, problem, hint
         self.value = value if isinstance(value, str) else repr(value)
-        self.problems = (Problem(rule, self.value, place), *more)
-        told = [str(problem) for problem in self.problems[:MOST_PROBLEMS]]
-        if (left := len(self.problems) - len(told)) > 0:
-            told.append(f"... and {left} more")
-        super().__init__("\n".join(told))
+        self.problems = (Problem(place, problem, self.value, hint), *more)
+        lines = [str(problem) for problem in self.problems[:MOST_PROBLEMS]]
+        if (left := len(self.problems) - len(lines)) > 0:
+            lines.append(f"... and {left} more")
+        super().__init__("\n".join(lines))
 
     @classmethod
     def of(cls, problems: Iterable[Problem]) -> Self:
         """Build the error of one problem or more."""
         first, *more = problems
-        return cls(first.rule, first.value, first.place, tuple(more))
+        return cls(first.place, first.problem, first.value, first.hint, tuple(more))
 
     def __reduce__(self) -> tuple[type, tuple]:
-        return type(self), (self.rule, self.value, self.place, self.problems[1:])
+        return type(self), (self.place, self.problem, self.value, self.hint, self.problems[1:])
 
 
 class StudyError(InputError):

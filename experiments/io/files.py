@@ -63,7 +63,7 @@ def require_new_file(path: Path, what: str) -> None:
     """
     # pathlib raises where a name is too long for the system
     if os.path.lexists(path):
-        raise InputError(f"{what} never overwrites a file", "one that exists", str(path))
+        raise InputError(str(path), f"{what} never overwrites a file", "one that exists")
     _require_place(path, path)
 
 
@@ -92,7 +92,7 @@ def _require_place(file: Path, shown: Path) -> None:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise
         rule = "must be a place that can be made and written to"
-        raise InputError(rule, error.strerror or "none", str(shown)) from error
+        raise InputError(str(shown), rule, error.strerror or "none") from error
     finally:
         # the innermost first; another run may write there just now
         for folder in made:
@@ -124,9 +124,9 @@ def check_file(path: Path, largest: int) -> None:
     """
     facts = path.stat()
     if not stat.S_ISREG(facts.st_mode):
-        raise InputError("must be a regular file", "a pipe, a device or a folder", str(path))
+        raise InputError(str(path), "must be a regular file", "a pipe, a device or a folder")
     if facts.st_size > largest:
-        raise InputError(f"must have at most {largest:,} bytes", f"{facts.st_size:,}", str(path))
+        raise InputError(str(path), f"must have at most {largest:,} bytes", f"{facts.st_size:,}")
 
 
 def read_file(path: Path, largest: int) -> bytes:
@@ -153,7 +153,7 @@ def existing(path: Path) -> Path:
         When there is no such file.
     """
     if not path.is_file():
-        raise InputError("a folder to gather from must hold what it is named for", "no such file", str(path))
+        raise InputError(str(path), "a folder to gather from must hold what it is named for", "no such file")
     return path
 
 

@@ -31,7 +31,7 @@ class Row:
 
     def error(self, rule: str, column: str) -> InputError:
         """Build the error of a cell that breaks a rule."""
-        return InputError(rule, self[column] or "nothing", self.place(column))
+        return InputError(self.place(column), rule, self[column] or "nothing")
 
 
 def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> Iterator[Row]:
@@ -50,9 +50,9 @@ def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> It
             header = cells
             _check_header(path, line, header, needed, known)
         elif any(cells[len(header) :]):
-            rule = f"a row has a cell for each of the {len(header)} columns"
+            rule = f"expected a row has a cell for each of the {len(header)} columns"
             rule += " (a comma inside a text needs quotes)"
-            raise InputError(rule, f"{len(cells)} cells", f"{path}:{line}")
+            raise InputError(f"{path}:{line}", rule, f"{len(cells)} cells")
         else:
             yield Row(path, line, dict(zip(header, cells, strict=False)))
 
@@ -70,7 +70,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
             if any(cells) and not cells[0].startswith("#"):
                 yield reader.line_num, cells
     except csv.Error as error:
-        raise InputError("must be a readable CSV file", str(error), str(path)) from None
+        raise InputError(str(path), "must be a readable CSV file", str(error)) from None
 
 
 def _delimiter(text: str) -> str:
@@ -90,10 +90,10 @@ def _check_header(
 ) -> None:
     place = f"{path}:{line}"
     if missing := [name for name in needed if name not in header]:
-        rule = f"the first row names the columns, separated by commas; missing: {', '.join(missing)}"
-        raise InputError(rule, ", ".join(header), place)
+        rule = f"expected the first row names the columns, separated by commas; missing: {', '.join(missing)}"
+        raise InputError(place, rule, ", ".join(header))
     for name in header:
         if name not in known:
-            raise InputError(f"must be a known column, {nearest_name(name, list(known))}", name, place)
+            raise InputError(place, f"must be a known column, {nearest_name(name, list(known))}", name)
         if header.count(name) > 1:
-            raise InputError("every column stands once", name, place)
+            raise InputError(place, "expected every column stands once", name)

@@ -37,7 +37,7 @@ def read_text(path: Path, largest: int = LARGEST) -> str:
     try:
         data = read_file(path, largest)
     except OSError as error:
-        raise InputError("must be a readable file", error.strerror or str(error), str(path)) from None
+        raise InputError(str(path), "must be a readable file", error.strerror or str(error)) from None
     return decoded(data, str(path))
 
 
@@ -49,13 +49,13 @@ def decoded(data: bytes, place: str) -> str:
         named = "UTF-16" if zeros[0] < 0.05 and zeros[1] > 0.5 else "binary data"
     if named:
         advice = ": save it as UTF-8" if named.startswith("UTF") else ""
-        raise InputError("must be text in UTF-8", f"{named}{advice}", place)
+        raise InputError(place, "must be text in UTF-8", f"{named}{advice}")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         received = f"the byte 0x{data[error.start]:02x}, as of Windows-1252 or Latin-1: save it as UTF-8"
-        raise InputError("must be text in UTF-8", received, f"{place}, line {line}") from None
+        raise InputError(f"{place}, line {line}", "must be text in UTF-8", received) from None
 
 
 def split(line: str, delimiter: str | None) -> list[str]:

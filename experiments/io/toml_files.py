@@ -41,14 +41,14 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
         number = int(found[1]) if found else len(text.splitlines())
         # another rule for what ends a line may know fewer of them
         shown = "".join(text.split("\n")[number - 1 : number]).strip()[:LONGEST_SHOWN]
-        raise StudyError(f"must be valid TOML: {error}", shown, f"{path}:{number}") from None
+        raise StudyError(f"{path}:{number}", f"must be valid TOML: {error}", shown) from None
     except RecursionError:
-        raise StudyError("must be TOML of a few levels", "a table far deeper", str(path)) from None
+        raise StudyError(str(path), "must be TOML of a few levels", "a table far deeper") from None
     except InputError as error:
-        raise StudyError(f"{what} {error.rule}", error.value, error.place) from None
+        raise StudyError(error.place, f"expected {what} {error.problem}", error.value) from None
     except ValueError as error:
         # an integer of thousands of digits, for one
-        raise StudyError("must be valid TOML", str(error), str(path)) from None
+        raise StudyError(str(path), "must be valid TOML", str(error)) from None
 
 
 def _check_keys(text: str) -> None:

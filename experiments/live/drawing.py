@@ -38,7 +38,7 @@ def heap_spheres(folder: Path, name: str) -> tuple[np.ndarray, str, float]:
     if name == "heap":
         return _few(_heap_file(inside(folder, "heap.vtp"))), "finished", 1.0
     if kind not in ("glimpse", "case") or not _NAME.fullmatch(key):
-        raise InputError("must be the name of a heap", name, str(folder))
+        raise InputError(str(folder), "must be the name of a heap", name)
     path = inside(folder, f"{JOURNAL}/{GLIMPSES}/{key}.npz" if kind == "glimpse" else f"{CASES}/{key}.npz")
     if kind == "case":
         # the simulator's classes take a second to import
@@ -49,7 +49,7 @@ def heap_spheres(folder: Path, name: str) -> tuple[np.ndarray, str, float]:
     try:
         spheres, facts = read_glimpse(path)
     except ValueError as error:
-        raise InputError(str(error), "another file", str(path)) from None
+        raise InputError(str(path), str(error), "another file") from None
     return _few(spheres), facts["phase"], facts["fraction"]
 
 

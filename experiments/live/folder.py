@@ -29,18 +29,18 @@ def inside(folder: Path, name: str) -> Path:
     """
     parts = PurePosixPath(name).parts
     if not parts or name.startswith("/") or "\\" in name or "\0" in name or ".." in parts:
-        raise InputError("must name a file below the folder", name, str(folder))
+        raise InputError(str(folder), "must name a file below the folder", name)
     path = folder
     for part in parts:
         path = path / part
         try:
             facts = path.lstat()
         except (OSError, ValueError):
-            raise InputError("must name a file below the folder", name, str(folder)) from None
+            raise InputError(str(folder), "must name a file below the folder", name) from None
         if stat.S_ISLNK(facts.st_mode):
-            raise InputError("links are not followed", name, str(folder))
+            raise InputError(str(folder), "expected links are not followed", name)
     if not stat.S_ISREG(facts.st_mode):
-        raise InputError("must name a regular file", name, str(folder))
+        raise InputError(str(folder), "must name a regular file", name)
     return path
 
 

@@ -48,7 +48,7 @@ def require_libraries() -> None:
         import uvicorn  # noqa: F401
     except ImportError as error:
         rule = f"the page in the browser needs two small libraries: {INSTALL}"
-        raise InputError(rule, f"no module {error.name}", "dem-warp") from None
+        raise InputError("dem-warp", rule, f"no module {error.name}") from None
 
 
 def guarded(routes: Sequence[BaseRoute], token: str) -> ASGIApp:
@@ -93,7 +93,7 @@ class Place:
         except (OSError, OverflowError) as error:
             found.close()
             reason = getattr(error, "strerror", None) or str(error)
-            raise InputError(f"must be a free port of this machine ({reason})", port, "--port") from None
+            raise InputError("--port", f"must be a free port of this machine ({reason})", port) from None
         return cls(found, new_token())
 
     @property

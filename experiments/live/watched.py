@@ -149,7 +149,7 @@ def refused(request: Request, error: Exception) -> Response:
     from starlette.responses import JSONResponse
 
     problems = error.problems if isinstance(error, InputError) else ()
-    rows = [{"rule": each.rule, "value": each.value, "place": each.place} for each in problems]
+    rows = [{"problem": each.problem, "value": each.value, "place": each.place} for each in problems]
     return JSONResponse({"error": str(error), "problems": rows}, status_code=422)
 
 

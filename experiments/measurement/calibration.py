@@ -131,7 +131,7 @@ def _value(row: Row, unit: str) -> float:
             quantity = replace(quantity, unit=unit)
         value = quantity.to_base(DIMENSIONS[unit]) / (100.0 if share else 1.0)
     except ValueError as error:
-        raise InputError(str(error), row["value"] or "nothing", f"{row.file}:{row.line}: value") from None
+        raise InputError(f"{row.file}:{row.line}: value", str(error), row["value"] or "nothing") from None
     if not (value >= 0.0 and math.isfinite(value)) or (share and unit != "1"):
         raise row.error("is a standard deviation, 0 or more, in the unit of the observable", "value")
     return value

@@ -39,7 +39,7 @@ class Repeats:
         """
         first, where = self._given.setdefault(content, (heap, f"{told} ({place})"))
         if first != heap:
-            raise InputError(f"{REPEATS}: this is the same as {where}", told, place)
+            raise InputError(place, f"expected {REPEATS}: this is the same as {where}", told)
 
 
 def require_separate(pictures: Iterable[Path], place: str) -> None:

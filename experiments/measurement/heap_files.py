@@ -64,11 +64,11 @@ def heap_settings(unit: str | None, plate_height: str | None) -> HeapSettings:
     try:
         size = None if unit is None else length_unit(unit)
     except ValueError as error:
-        raise InputError(str(error), unit, "--unit") from None
+        raise InputError("--unit", str(error), unit) from None
     try:
         height = None if plate_height is None else Quantity.parse(plate_height).to_base("length")
     except ValueError as error:
-        raise InputError(str(error), plate_height, "--plate-height") from None
+        raise InputError("--plate-height", str(error), plate_height) from None
     return HeapSettings(size, height)
 
 
@@ -90,15 +90,17 @@ def measure_heap_file(path: Path, fit: str, settings: HeapSettings) -> MeasuredH
     """
     file = read_spheres(path)
     if settings.unit is not None and file.unit is not None and settings.unit != file.unit:
-        rule = "the unit given is that which the file names"
-        raise InputError(rule, f"{settings.unit:g} m for {file.unit:g} m", f"{path}, --unit")
+        rule = "expected the unit given is that which the file names"
+        raise InputError(f"{path}, --unit", rule, f"{settings.unit:g} m for {file.unit:g} m")
     size = settings.unit or file.unit or length_unit(DEFAULT_UNIT)
     spheres = Spheres.of(file.spheres[:, :3] * size, file.spheres[:, 3] * size)
     height = find_ground(spheres) if settings.plate_height is None else settings.plate_height
     standing = spheres.centers[:, 2] > height - BELOW * spheres.radii
     if not standing.any():
         raise InputError(
-            "spheres stand on the plate", f"none above {1e3 * height:g} mm", f"{path}, --plate-height"
+            f"{path}, --plate-height",
+            "expected spheres stand on the plate",
+            f"none above {1e3 * height:g} mm",
         )
     heap = Spheres(spheres.centers[standing] - np.array([0.0, 0.0, height]), spheres.radii[standing])
     settled = MeasurementSection()

@@ -126,7 +126,7 @@ def _told_once(wrong: Sequence[tuple[int, Problem]]) -> Iterator[Problem]:
     alike: dict[tuple[str, str], list[tuple[int, Problem]]] = {}
     for line, problem in wrong:
         column = problem.place.rpartition(": ")[2]
-        alike.setdefault((problem.rule, column), []).append((line, problem))
+        alike.setdefault((problem.problem, column), []).append((line, problem))
     for rows in alike.values():
         first = rows[0][1]
         if len(rows) == 1:
@@ -134,7 +134,7 @@ def _told_once(wrong: Sequence[tuple[int, Problem]]) -> Iterator[Problem]:
             continue
         values = list(dict.fromkeys(problem.value for _, problem in rows))
         shown = ", ".join(values[:3]) + (", ..." if len(values) > 3 else "")
-        yield Problem(first.rule, shown, f"{first.place}, {_rows([line for line, _ in rows])}")
+        yield Problem(f"{first.place}, {_rows([line for line, _ in rows])}", first.problem, shown)
 
 
 def _heap_of(row: Row, conditions: Collection[str]) -> tuple[str, str]:
@@ -149,10 +149,10 @@ def _heap_of(row: Row, conditions: Collection[str]) -> tuple[str, str]:
 
 def _set_aside(doubts: Sequence[tuple[int, Problem]]) -> Iterator[str]:
     """Say which rows were set aside: a note for all that break the same rule."""
-    for rule in dict.fromkeys(doubt.rule for _, doubt in doubts):
-        alike = [(line, doubt.value) for line, doubt in doubts if doubt.rule == rule]
+    for rule in dict.fromkeys(doubt.problem for _, doubt in doubts):
+        alike = [(line, doubt.value) for line, doubt in doubts if doubt.problem == rule]
         received = alike[0][1] if len(alike) == 1 else f"{alike[0][1]}, ..."
-        yield f"{_rows([line for line, _ in alike])}: {rule} (received {received}); set aside"
+        yield f"{_rows([line for line, _ in alike])}: {rule}, got {received}; set aside"
 
 
 def _rows(lines: Sequence[int]) -> str:
@@ -174,7 +174,7 @@ def _gather(
     settled = {key: _settle(key, readings, notes) for key, readings in heaps.items()}
     found = {name for heap in settled.values() if heap for name in heap}
     if not found:
-        raise InputError("needs at least one measured value", "none", str(path))
+        raise InputError(str(path), "needs at least one measured value", "none")
     observables = tuple(name for name in names if name in found)
     values, reasons = {}, {}
     for condition in conditions:

@@ -59,7 +59,7 @@ def view_of(
     """
     corners = _four(crop, "--crop")
     if corners is not None and any(value != int(value) for value in corners):
-        raise InputError("X1,Y1,X2,Y2 are whole pixels", crop, "--crop")
+        raise InputError("--crop", "expected X1,Y1,X2,Y2 are whole pixels", crop)
     part = None if corners is None else (int(corners[0]), int(corners[1]), int(corners[2]), int(corners[3]))
     return View(part, _four(plate, "--plate"), heap, elevation, distance)
 
@@ -70,9 +70,9 @@ def _four(text: str | None, option: str) -> tuple[float, float, float, float] | 
     try:
         x1, y1, x2, y2 = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError("four numbers X1,Y1,X2,Y2", text, option) from None
+        raise InputError(option, "expected four numbers X1,Y1,X2,Y2", text) from None
     if not np.isfinite([x1, y1, x2, y2]).all():
-        raise InputError("four finite numbers X1,Y1,X2,Y2", text, option)
+        raise InputError(option, "expected four finite numbers X1,Y1,X2,Y2", text)
     return x1, y1, x2, y2
 
 
@@ -88,7 +88,7 @@ def require_one_form(chosen: Mapping[str, bool]) -> None:
     if len(given) > 1:
         *others, last = chosen
         rule = f"only one of {', '.join(others)} and {last}: each is the whole output"
-        raise InputError(rule, " ".join(given), given[1])
+        raise InputError(given[1], rule, " ".join(given))
 
 
 def grouping_of(by: str) -> Grouping:
@@ -97,7 +97,7 @@ def grouping_of(by: str) -> Grouping:
         return "picture"
     if by == "folder":
         return "folder"
-    raise InputError("is picture or folder", by, "--by")
+    raise InputError("--by", "is picture or folder", by)
 
 
 def measure_pictures(
@@ -142,7 +142,7 @@ def measure_pictures(
     """
     FitSettings.of(fit)
     if overlay_folder and any(folder.is_file() for folder in (overlay_folder, *overlay_folder.parents)):
-        raise InputError("copies are drawn in a folder", f"the file {overlay_folder}", "--overlay")
+        raise InputError("--overlay", "expected copies are drawn in a folder", f"the file {overlay_folder}")
     names = drawn_names(pictures)
     rows = []
     for picture, name in zip(pictures, names, strict=True):
@@ -170,9 +170,7 @@ def measure_pictures(
         except (PictureError, InputError) as error:
             row["reason"] = str(error) if str(picture) in str(error) else f"{picture}: {error}"
         except MemoryError:
-            row["reason"] = (
-                f"{picture}: expected: a picture that fits into memory; received one that does not"
-            )
+            row["reason"] = f"{picture}: expected: a picture that fits into memory, got one that does not"
         except Exception as error:
             task = "drawing" if row["mean"] is not None else "measuring"
             row["reason"] = f"{picture}: {task} failed: {type(error).__name__}: {error}"
@@ -320,7 +318,7 @@ def target_section(
     _require_separate_heaps(rows, by)
     if mean is None or mean.sd is None:
         received = f"{mean.n if mean else 0} (doubtful pictures count with --keep-doubtful)"
-        raise InputError("a target needs two measured heaps at the least", received, "--target")
+        raise InputError("--target", "a target needs two measured heaps at the least", received)
     return (
         f"[target]  # {mean.pictures} photographs, {fit} fit; left out as doubtful: {len(mean.left_out)}\n"
         f'mean = "{mean.mean:.3f} deg"\n'

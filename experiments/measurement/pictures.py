@@ -45,7 +45,7 @@ def require_same_fit(fit: str, own: str, place: str) -> None:
     try:
         compare(*(_Stated(FitSettings.of(name)) for name in (fit, own)))
     except PictureError as error:
-        raise InputError(f"measured and simulated angles must compare: {error}", fit, place) from None
+        raise InputError(place, f"measured and simulated angles must compare: {error}", fit) from None
 
 
 def find_pictures(pattern: str, folder: Path, place: str) -> list[Path]:
@@ -63,7 +63,7 @@ def find_pictures(pattern: str, folder: Path, place: str) -> list[Path]:
         found = sorted(map(Path, glob(str(named))))
     if len(found) < 2:
         rule = f"must name at least two pictures of heaps (looked for {named})"
-        raise InputError(rule, f"{pattern}: {len(found)} found", place)
+        raise InputError(place, rule, f"{pattern}: {len(found)} found")
     return found
 
 
@@ -83,7 +83,7 @@ def measure_pictures(paths: Sequence[Path], fit: str) -> dict[Path, ReposeAngle]
         try:
             angles[path] = measure_photograph(path, fit)
         except PictureError as error:
-            problems.append(Problem("must show a heap that can be measured", str(error), str(path)))
+            problems.append(Problem(str(path), "must show a heap that can be measured", str(error)))
     if problems:
         raise InputError.of(problems)
     return angles

@@ -51,7 +51,7 @@ class SizeOfTest:
         low, high = self.limits(BY_NAME["height"])
         if not low <= height <= high:
             rule = f"an outline is between {1e3 * low:.3g} and {1e3 * high:.3g} mm high in this test"
-            raise InputError(f"{rule}: {question}", f"{1e3 * height:.6g} mm{told}", place)
+            raise InputError(place, f"expected {rule}: {question}", f"{1e3 * height:.6g} mm{told}")
 
 
 def size_of_test(study: Study, scene: str = TARGET_SCENE) -> SizeOfTest:

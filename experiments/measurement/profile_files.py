@@ -75,7 +75,7 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
         if np.hypot(x, z) > radius:
             rule = f"must lie in the drum, within {1e3 * radius:g} mm of its axis"
             value = f"x {row['x']}, z {row['z']}"
-            raise InputError(rule, value, f"{path}:{row.line}: x, z")
+            raise InputError(f"{path}:{row.line}: x, z", rule, value)
     _require_rows(found, path)
     places = np.array(STATIONS) * radius
     views = {name: [view.heights for view in each.values()] for name, each in found.items()}
@@ -84,7 +84,7 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     kept = [number for number, place in enumerate(places) if low <= place <= high]
     if len(kept) < LEAST_STATIONS:
         told = f"{1e3 * low:.4g} to {1e3 * high:.4g} mm, {len(kept)} stations"
-        raise InputError(f"all profiles must span {LEAST_STATIONS} stations of the drum", told, str(path))
+        raise InputError(str(path), f"all profiles must span {LEAST_STATIONS} stations of the drum", told)
     for each in found.values():
         for view in each.values():
             _check_surface(view, radius, f"{path}:{view.line}")
@@ -147,7 +147,7 @@ def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, 
 
 def _require_rows(found: Sized, path: Path) -> None:
     if not found:
-        raise InputError("needs rows below the names of the columns", "no rows", str(path))
+        raise InputError(str(path), "needs rows below the names of the columns", "no rows")
 
 
 def _require_own_points(found: Mapping[str, Mapping[str, _Points]], path: Path) -> None:
@@ -176,13 +176,13 @@ def _check_surface(view: _Points, radius: float, place: str) -> None:
     z = np.array([view.heights[each] for each in x])
     widest = int(np.argmax(np.diff(x)))
     if x[widest + 1] - x[widest] > WIDEST_GAP * radius:
-        rule = f"a profile has no gap: points at most {1e3 * WIDEST_GAP * radius:.4g} mm apart in x"
+        rule = f"expected a profile has no gap: points at most {1e3 * WIDEST_GAP * radius:.4g} mm apart in x"
         told = f"none between {1e3 * x[widest]:.4g} and {1e3 * x[widest + 1]:.4g} mm"
-        raise InputError(rule, told, f"{place}: x")
+        raise InputError(f"{place}: x", rule, told)
     rise = np.degrees(np.arctan(np.polyfit(x, z, 1)[0]))
     if rise > MIRRORED:
         rule = "the surface must be high on the left and fall to the right, z up: mirror x, or turn z over"
-        raise InputError(rule, f"rises by {rise:.1f} deg", f"{place}: x, z")
+        raise InputError(f"{place}: x, z", rule, f"rises by {rise:.1f} deg")
 
 
 def _drawn(view: _Points, place: str, size: SizeOfTest) -> np.ndarray:
@@ -192,15 +192,17 @@ def _drawn(view: _Points, place: str, size: SizeOfTest) -> np.ndarray:
     x = np.array(sorted(view.heights))
     z = np.array([view.heights[each] for each in x])
     if len(x) < LEAST_POINTS:
-        raise InputError(f"a heap's profile has {LEAST_POINTS} points or more", len(x), place)
+        raise InputError(place, f"expected a heap's profile has {LEAST_POINTS} points or more", len(x))
     if max(z[0], z[-1]) > FOOT * z.max():
-        rule = f"a heap's profile goes from foot to foot: both ends lower than {FOOT:.0%} of its height"
+        rule = (
+            f"expected a heap's profile goes from foot to foot: both ends lower than {FOOT:.0%} of its height"
+        )
         ends = f"{1e3 * z[0]:.4g} and {1e3 * z[-1]:.4g} of {1e3 * z.max():.4g} mm"
-        raise InputError(rule, ends, place)
+        raise InputError(place, rule, ends)
     try:
         heights = profile_heights(x, z, place)
     except PictureError as error:
-        raise InputError("a heap's profile has an area", "none", place) from error
+        raise InputError(place, "expected a heap's profile has an area", "none") from error
     size.require_height(float(z.max()), "is the unit right?", "", f"{place}: z")
     return heights
 
@@ -229,10 +231,10 @@ def _pictured(row: Row, fit: str, size: SizeOfTest) -> Iterator[np.ndarray]:
             raise row.error("must be greater than 0", "pixel")
         seen = measure(find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path)), fit)
     except PictureError as error:
-        raise InputError("must show a heap that can be measured", str(error), place) from None
+        raise InputError(place, "must show a heap that can be measured", str(error)) from None
     if seen.doubts:
         rule = "must show a heap without a doubt: crop it, or leave the row out"
-        raise InputError(rule, "; ".join(map(str, seen.doubts)), place)
+        raise InputError(place, rule, "; ".join(map(str, seen.doubts)))
     told = f" in {row['picture']}, with a pixel of {row['pixel']}"
     question = "is the size of the pixels right?"
     height = heap_shape(seen.outline).height

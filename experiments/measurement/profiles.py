@@ -70,9 +70,9 @@ def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any
         if "profiles" not in table:
             return [table]
         known = " or ".join(f'"{name}"' for name in PROFILES)
-        raise InputError(f"profiles are of the observable {known}", profile, place)
+        raise InputError(place, f"expected profiles are of the observable {known}", profile)
     if "profiles" not in table and not twin:
-        raise InputError(f'"{profile}" needs profiles, a file of them, or a twin', "neither", place)
+        raise InputError(place, f'"{profile}" needs profiles, a file of them, or a twin', "neither")
     name = table.get("scene", TARGET_SCENE)
     shared = {key: table[key] for key in ("scene",) if key in table}
     shared["part_of"] = f"{profile}_{name}".replace("-", "_") if name != TARGET_SCENE else profile
@@ -80,8 +80,8 @@ def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any
     if (profile == SURFACE_PROFILE) != isinstance(scene, Drum) or not (
         isinstance(scene, Drum) or scene.leaves_a_heap
     ):
-        rule = 'profiles are those of a drum, a "surface", or of a heap, an "outline"'
-        raise InputError(rule, f"{profile} of {scene.name}", place)
+        rule = 'expected profiles are those of a drum, a "surface", or of a heap, an "outline"'
+        raise InputError(place, rule, f"{profile} of {scene.name}")
     if twin:
         return [shared | {"observable": height} for height in PROFILES[profile]]
     path = study.file.parent / table["profiles"]
@@ -91,11 +91,11 @@ def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any
         found = read_heap_profiles(path, study.measurement.fit, size_of_test(study, name))
     if len(found.names) < LEAST_PROFILES:
         rule = f"needs profiles of {LEAST_PROFILES} repeats or more, each with a replicate of its own"
-        raise InputError(rule, f"{len(found.names)}: {', '.join(found.names)}", f"{path}: replicate")
+        raise InputError(f"{path}: replicate", rule, f"{len(found.names)}: {', '.join(found.names)}")
     try:
         sample = ProfileSample.of(found.heights, scatter_of_views(found.views))
     except RuleError as error:
-        raise InputError(f"profiles {error.rule}", error.value, str(path)) from None
+        raise InputError(str(path), f"expected profiles {error.problem}", error.value) from None
     return [shared | mode for mode in _modes(sample, found, profile, shared["part_of"])]
 
 

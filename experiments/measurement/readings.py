@@ -131,7 +131,7 @@ def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observab
         found = read_heap_profiles(path, fit, size)
     name = row["replicate"]
     if name not in found.names:
-        rule = f"the file {path} has a profile of each replicate, {nearest_name(name, found.names)}"
+        rule = f"expected the file {path} has a profile of each replicate, {nearest_name(name, found.names)}"
         raise row.error(rule, "replicate")
     own = map(float, found.heights[found.names.index(name)])
     for station, value in zip(found.stations, own, strict=True):
@@ -147,7 +147,7 @@ def _written(row: Row, observable: Observable, size: SizeOfTest) -> Reading:
     try:
         value = quantity.to_base(DIMENSIONS[observable.unit])
     except ValueError as error:
-        raise InputError(f"{observable.name} {error}", str(quantity), _place(row)) from None
+        raise InputError(_place(row), f"expected {observable.name} {error}", str(quantity)) from None
     return Reading(row, observable.name, value, doubt=_doubt(row, observable, value, size))
 
 
@@ -181,7 +181,7 @@ def _seen(
     angle = measure(outlines.find(path, pixel), fit, str(path))
     if angle.doubts:
         told = "; ".join(map(str, angle.doubts))
-        raise PictureError("a picture counts where nothing about it is in doubt", told, str(path))
+        raise PictureError(str(path), "expected a picture counts where nothing about it is in doubt", told)
     views = [View.of(angle)]
     for observable in dict.fromkeys(known.values()):
         wanted = observable is known[name] if name else observable.unit != "m" or pixel
@@ -209,8 +209,8 @@ def _doubt(row: Row, observable: Observable, value: float, size: SizeOfTest) -> 
         return None
     unit = "" if observable.unit == "1" else f" {observable.unit}"
     question = f"is the unit right (none given:{unit})?" if unit and not row["unit"] else "is the unit right?"
-    rule = f"{observable.name} lies between {low:.3g} and {high:.3g}{unit} in this test: {question}"
-    return Problem(rule, f"{value:.6g}{unit}", _place(row))
+    rule = f"expected {observable.name} lies between {low:.3g} and {high:.3g}{unit} in this test: {question}"
+    return Problem(_place(row), rule, f"{value:.6g}{unit}")
 
 
 def _place(row: Row) -> str:

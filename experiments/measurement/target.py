@@ -67,7 +67,7 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
         )
         if len(clear) < 2:
             rule = f"needs two pictures of heaps without a doubt ({'; '.join(notes)})"
-            raise InputError(rule, len(clear), f"{place}.pictures")
+            raise InputError(f"{place}.pictures", rule, len(clear))
         sample = Sample.of([angle.mean for angle in clear.values()])
         note = f"{len(clear)} pictures: {', '.join(path.name for path in clear)}"
         return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), notes
@@ -106,7 +106,7 @@ def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path
     has = ", ".join(f"{_column(one)} ({one.condition})" for one in fitted) or "none"
     rule = f"must be an observable with two values that differ under the target's condition; {path} has {has}"
     rule += "".join(f"; {note}" for note in notes if section.observable in note)
-    raise InputError(rule, f"{section.observable} ({section.scene})", f"{study.file}: target.observable")
+    raise InputError(f"{study.file}: target.observable", rule, f"{section.observable} ({section.scene})")
 
 
 def find_pictured(study: Study) -> list[Path]:
@@ -123,9 +123,9 @@ def find_pictured(study: Study) -> list[Path]:
         return []
     if not study.scene.leaves_a_heap:
         rule = "must be left out of a test that leaves no heap; of a drum give profiles"
-        raise InputError(rule, study.scene.kind.name, place)
+        raise InputError(place, rule, study.scene.kind.name)
     if section.observable != ANGLE or section.scene != TARGET_SCENE:
-        raise InputError("photographs give the angle of the study's own scene", section.title, place)
+        raise InputError(place, "expected photographs give the angle of the study's own scene", section.title)
     paths = find_pictures(section.pictures, study.file.parent, place)
     require_separate(paths, place)
     return paths
@@ -162,7 +162,7 @@ def _given(study: Study, measured: list[Replicated], note: str, asked: Replicate
     tables = target_tables(study, measured, asked)
     if not tables:
         rule = "needs an observable with two values or more under a condition that is not held out"
-        raise InputError(rule, note, f"{study.file}: target")
+        raise InputError(f"{study.file}: target", rule, note)
     responses = [*tables.get("response", []), *document.get("response", [])]
     document |= {"target": tables["target"] | {"note": note}}
     return study.with_document(document | ({"response": responses} if responses else {}))

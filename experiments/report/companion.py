@@ -93,6 +93,6 @@ def companion_of(study: Study) -> Companion:
     known = sorted(path.parent.name for path in STUDIES.glob("*/companion.py"))
     if study.companion not in known:
         rule = f"companion: must be a study that has one, {nearest_name(study.companion, known)}"
-        raise StudyError(rule, study.companion, str(study.file))
+        raise StudyError(str(study.file), rule, study.companion)
     companion: Companion = import_module(f"experiments.studies.{study.companion}.companion").COMPANION
     return companion

@@ -213,7 +213,7 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> Stud
 
 def _no_published_runs(study: Study) -> StudyError:
     rule = "only a study whose companion has published runs can follow them"
-    return StudyError(rule, study.companion or "no companion", str(study.file))
+    return StudyError(str(study.file), rule, study.companion or "no companion")
 
 
 def _provenance(desk: Desk, replay: Replay) -> dict[str, Any]:

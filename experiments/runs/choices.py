@@ -37,7 +37,9 @@ def chosen_resources(
     """
     if scheduler is not None and cluster is not None:
         raise InputError(
-            "workers are those of a scheduler or of a profile", f"{scheduler}; {cluster}", "--scheduler"
+            "--scheduler",
+            "expected workers are those of a scheduler or of a profile",
+            f"{scheduler}; {cluster}",
         )
     section = read_profile(Path(cluster)) if cluster is not None else None
     resources = Resources(device, workers, scheduler, section)
@@ -67,7 +69,7 @@ def chosen_study(study: Study | str | Path | None, scale: str | None, resources:
     """
     if isinstance(study, Study):
         if scale not in (None, study.scale):
-            raise StudyError(f"is loaded at the scale {study.scale!r}", scale, f"{study.file}: scale")
+            raise StudyError(f"{study.file}: scale", f"is loaded at the scale {study.scale!r}", scale)
         return study
     path = None if study is None else Path(study)
     if scale is None:

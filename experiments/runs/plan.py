@@ -115,7 +115,7 @@ def measured_speed(resources: Resources, measure: bool = True) -> Speed:
         return speed
     if not measure:
         rule = "the speed of these workers must be measured before: dem-warp doctor --measure with the same"
-        raise InputError(rule, "never measured", resources.machine)
+        raise InputError(resources.machine, rule, "never measured")
     return measure_and_store(resources)
 
 
@@ -229,7 +229,7 @@ def _plan(
         return _sized_plan(study, resources, speed, waves, stored)
     except ValueError as error:
         # a run has it as the reason of a case that could not begin
-        raise StudyError(str(error), study.scale or "this study", str(study.file)) from error
+        raise StudyError(str(study.file), str(error), study.scale or "this study") from error
 
 
 def _sized_plan(

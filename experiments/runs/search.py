@@ -223,7 +223,7 @@ def read_data(job: Job) -> Measured | None:
     shown = [each.name for each in job.study.measurable if each.instrument is Instrument.PHOTOGRAPH]
     if not set(shown) & set(measured.observables):
         rule = f"a search on photographs only needs what they show: one of {', '.join(shown)}"
-        raise InputError(rule, ", ".join(measured.observables), str(job.measured))
+        raise InputError(str(job.measured), rule, ", ".join(measured.observables))
     return measured.only(shown)
 
 

@@ -246,13 +246,13 @@ class Target:
     def __post_init__(self) -> None:
         names = [response.name for response in self.responses]
         if not names or len(set(names)) < len(names):
-            raise ValueError(f"Target.responses: at least one, each of a name of its own (received {names})")
+            raise ValueError(f"Target.responses: at least one, each of a name of its own, got {names}")
         if self.leading.held_out:
-            raise ValueError(f"Target.responses: the first is not held out (received {names[0]})")
+            raise ValueError(f"Target.responses: the first is not held out, got {names[0]}")
         for response in self.responses:
             if (response.measured is None) != (self.twin is not None):
                 rule = "has its measurements, unless a twin study simulates them"
-                raise ValueError(f"response {response.name}: {rule} (received {response.measured})")
+                raise ValueError(f"response {response.name}: {rule}, got {response.measured}")
 
     @property
     def leading(self) -> Response:

@@ -69,10 +69,10 @@ def check_laws(document: Mapping[str, Any], sections: Mapping[str, Any], path: P
         return  # the study's sections are checked next, with their places
     if own != others and solver.get(CARD_LAWS) != others.name:
         rule = (
-            f"the values of the card hold for the laws {others.name!r} and mean something else in these: "
+            f"expected the values of the card hold for the laws {others.name!r} and mean something else in these: "
             f'take those, or say {CARD_LAWS} = "{others.name}" beside them to take the values as they are'
         )
-        raise StudyError(rule, solver[LAWS], f"solver.{LAWS}, with the card {path}")
+        raise StudyError(f"solver.{LAWS}, with the card {path}", rule, solver[LAWS])
 
 
 def read_card(path: Path) -> dict[str, Any]:
@@ -86,8 +86,8 @@ def read_card(path: Path) -> dict[str, Any]:
     _, card = read_toml(path, "a material card")
     sections = card.get(MATERIAL)
     if not isinstance(sections, dict) or not set(sections) <= set(SECTIONS):
-        rule = f"a material card has the tables {', '.join(f'[{MATERIAL}.{name}]' for name in SECTIONS)}"
-        raise StudyError(rule, sorted(card), str(path))
+        rule = f"expected a material card has the tables {', '.join(f'[{MATERIAL}.{name}]' for name in SECTIONS)}"
+        raise StudyError(str(path), rule, sorted(card))
     for table, key in files_of(sections):
         table[key] = str(path.parent.resolve() / table[key])
     bridge = card.get(BRIDGE)
@@ -115,7 +115,9 @@ def card_document(card: Mapping[str, Any], path: Path) -> dict[str, Any]:
     """
     fitted = card.get("fitted", {})
     if not isinstance(fitted, Mapping) or "test" not in fitted:
-        raise StudyError("a card says which test it was fitted to, [fitted.test.NAME]", fitted, str(path))
+        raise StudyError(
+            str(path), "expected a card says which test it was fitted to, [fitted.test.NAME]", fitted
+        )
     kept = {name: fitted[name] for name in FITTED if name in fitted}
     name = str(card.get("name", path.stem))
     return {"name": name, "scene": fitted["test"]} | kept | read_card(path)

@@ -51,8 +51,10 @@ def surface_of(table: object, units: Mapping[str, str], place: str) -> Surface:
         full = fit_surface(design, table["values"], table["full"])
         return replace(fit_surface(design, table["values"], table["terms"]), selected_from=full)
     except (DesignError, KeyError, TypeError, ValueError) as error:
-        rule = "a card holds the surface that its values were found on, as dem-warp calibrate writes it"
-        raise StudyError(rule, f"{type(error).__name__}: {error}", place) from None
+        rule = (
+            "expected a card holds the surface that its values were found on, as dem-warp calibrate writes it"
+        )
+        raise StudyError(place, rule, f"{type(error).__name__}: {error}") from None
 
 
 def card_surfaces(card: Mapping[str, Any], path: Path) -> dict[str, Surface]:

@@ -112,7 +112,7 @@ class FactorSection(Section):
             try:
                 setter.write(changes, Quantity(float(value), self.unit))
             except ValueError as error:
-                raise StudyError(str(error), value, places.of(setter.path)) from None
+                raise StudyError(places.of(setter.path), str(error), value) from None
 
     def factor(self) -> Factor:
         """Build the factor of the designs."""
@@ -188,4 +188,4 @@ def check_one_home(document: Mapping[str, Any], sections: Iterable[FactorSection
     for name, path in homes:
         if (value := value_at(document, path)) is not None:
             rule = f"is varied by the factor {name!r} and takes no fixed value: remove one of them"
-            raise StudyError(rule, value, places.of(path))
+            raise StudyError(places.of(path), rule, value)

@@ -60,4 +60,4 @@ def _problems(names: Sequence[str], taken: Collection[str], places: Places) -> I
             rule = (
                 "is a column of the results' tables: a factor takes another name, 'E' or 'friction' for one"
             )
-            yield Problem(rule, repr(name), places.of(("factor", index, "name")))
+            yield Problem(places.of(("factor", index, "name")), rule, repr(name))

@@ -236,4 +236,4 @@ def _problem(
             rule = "is required"
         case _:
             rule = message(details)
-    return Problem(rule, "nothing" if value is None else repr(value), places.of(path))
+    return Problem(places.of(path), rule, "nothing" if value is None else repr(value))

@@ -107,7 +107,7 @@ class SolverSection(Section):
             f"the values of the card must run in {solver!r}, which a bridge has corrected them for: name it "
             f'as [engine], or say {CARD_SOLVER} = "{solver}" under [solver] to take the values as they are'
         )
-        raise StudyError(rule, name, place)
+        raise StudyError(place, rule, name)
 
 
 def laws_of(solver: Mapping[str, Any]) -> ContactLaws:

@@ -145,12 +145,12 @@ class Study(Physics):
         """
         if self.target_section is not None and self.target_section.lacks_a_heap(self.scenes):
             rule = "is the angle of a heap, which this test does not leave: name an observable of the test"
-            raise StudyError(rule, "no observable", f"{self.file}: target")
+            raise StudyError(f"{self.file}: target", rule, "no observable")
         if self._target is None and self.target_section is not None:
             rule = "names pictures, profiles or a file: with_measurements takes numbers from them"
-            raise StudyError(rule, "no numbers", f"{self.file}: target")
+            raise StudyError(f"{self.file}: target", rule, "no numbers")
         if self._target is None:
-            raise StudyError("a calibration needs a [target] or a [[response]]", "none", str(self.file))
+            raise StudyError(str(self.file), "a calibration needs a [target] or a [[response]]", "none")
         return self._target
 
     @property
@@ -195,7 +195,7 @@ class Study(Physics):
         known = {each.name: each for each in self.conditions}
         if condition not in known:
             rule = f"must be a condition of the study, {nearest_name(condition, list(known))}"
-            raise StudyError(rule, condition, str(self.file))
+            raise StudyError(str(self.file), rule, condition)
         if condition not in self._under:
             document, fixed = under_condition(self._document, known[condition])
             study = _build(document, replace(self._places, condition=condition))
@@ -232,7 +232,7 @@ class Study(Physics):
             try:
                 natural[name] = natural_value(self.factor_sections, name, value)
             except ValueError as error:
-                raise StudyError(str(error), value, f"{source}: {name}") from None
+                raise StudyError(f"{source}: {name}", str(error), value) from None
         return natural
 
     def case(self, settings: Mapping[str, float], seed: int, scene: str = TARGET_SCENE) -> Case:
@@ -249,22 +249,22 @@ class Study(Physics):
             return self.under(scene).case(settings, seed)
         if scene not in self.scenes:
             rule = f"must name a scene of the study, {nearest_name(scene, list(self.scenes))}"
-            raise StudyError(rule, scene, str(self.file))
+            raise StudyError(str(self.file), rule, scene)
         changes: dict[str, Any] = {}
         for name, value in settings.items():
             if name in self._factors:
                 self._factors[name].write(changes, value, self._places)
             elif name not in self._fixed:
                 rule = f"must name a factor, {nearest_name(name, list(self._factors))}"
-                raise StudyError(rule, name, str(self.file))
+                raise StudyError(str(self.file), rule, name)
         if scene != TARGET_SCENE:
             changes["scene"] = self.response_scenes[scene]
         try:
             return changed(self._physics, changes).build_case(seed)
         except TooManyGrains as error:
-            raise StudyError(error.rule, error.number, self._place_of_grains(scene)) from None
+            raise StudyError(self._place_of_grains(scene), error.problem, error.number) from None
         except ValueError as error:
-            raise StudyError(str(error), dict(settings), str(self.file)) from error
+            raise StudyError(str(self.file), str(error), dict(settings)) from error
 
     def _place_of_grains(self, scene: str) -> str:
         """Place of the number of a scene's grains, or of the container that it follows from."""
@@ -311,7 +311,7 @@ def load_study(
     if scale is not None:
         if scale not in scales:
             rule = f"the scale must be one that the study has, {nearest_name(scale, list(scales))}"
-            raise StudyError(rule, scale, str(path))
+            raise StudyError(str(path), rule, scale)
         document = merge(document, scales[scale])
     return _build(with_material(merge(document, changes or {}), path.parent), places)
 
@@ -342,8 +342,10 @@ def _build(document: dict[str, Any], places: Places) -> Study:
         study.under(name)
     for name in study.response_scenes:
         if name == TARGET_SCENE or name in study.condition_sections:
-            rule = f"a further scene has a name of its own: {name!r} is the study's own, or a condition"
-            raise StudyError(rule, name, places.of(("response-scene", name)))
+            rule = (
+                f"expected a further scene has a name of its own: {name!r} is the study's own, or a condition"
+            )
+            raise StudyError(places.of(("response-scene", name)), rule, name)
     held_out = [condition.name for condition in study.conditions if condition.held_out]
     target, responses = study.target_section, study.response_sections
     titles = [section.title for section in (*([target] if target else []), *responses)]
@@ -357,8 +359,10 @@ def _check_restitution(study: Study) -> None:
     for section in study.factor_sections if study.solver.laws.damping_rate is not None else ():
         if any(path[-1] == "restitution" for path in section.paths):
             damping = study.solver.laws.normal_damping
-            rule = f"varies a restitution, and the damping {damping!r} takes none: leave the factor out"
-            raise StudyError(rule, section.name, f"{study.file}: factor {section.name}")
+            rule = (
+                f"expected varies a restitution, and the damping {damping!r} takes none: leave the factor out"
+            )
+            raise StudyError(f"{study.file}: factor {section.name}", rule, section.name)
 
 
 def study_scales(path: str | Path | None = None) -> tuple[str, ...]:
@@ -376,5 +380,5 @@ def study_scales(path: str | Path | None = None) -> tuple[str, ...]:
 def _scales(path: Path, document: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
     scales = document.get("scale", {})
     if not isinstance(scales, Mapping) or not all(isinstance(table, Mapping) for table in scales.values()):
-        raise StudyError("scales are tables, [scale.NAME]", scales, str(path))
+        raise StudyError(str(path), "expected scales are tables, [scale.NAME]", scales)
     return scales

@@ -78,7 +78,7 @@ class ResponseSection(Section):
         if measured:
             if missing := [name for name in MEASUREMENTS if getattr(self, name) is None]:
                 rule = f"needs mean, sd and n of what was measured; missing: {', '.join(missing)}"
-                raise StudyError(rule, self.title, places.of(path))
+                raise StudyError(places.of(path), rule, self.title)
             sample = Sample(values["mean"], values["sd"], int(self.n or 0))
         weights = tuple((self.weights or {}).items())
         return Response(
@@ -101,11 +101,11 @@ class ResponseSection(Section):
         try:
             value = quantity.to_base(DIMENSIONS[unit])
         except ValueError as error:
-            raise StudyError(str(error), str(quantity), place) from None
+            raise StudyError(place, str(error), str(quantity)) from None
         if name == "sd" and not value > 0.0:
-            raise StudyError("must be positive", str(quantity), place)
+            raise StudyError(place, "must be positive", str(quantity))
         if name == "mean" and unit == "deg" and not 0.0 < value < 90.0:
-            raise StudyError("must be an angle between 0 and 90 deg", str(quantity), place)
+            raise StudyError(place, "must be an angle between 0 and 90 deg", str(quantity))
         return float(value)
 
 
@@ -172,7 +172,7 @@ def build_target(
         return None
     if built[0].held_out:
         rule = "leads the climb, so it must not be measured under a held-out condition"
-        raise StudyError(rule, built[0].scene, places.of((*sections[0][0], "scene")))
+        raise StudyError(places.of((*sections[0][0], "scene")), rule, built[0].scene)
     return Target(tuple(built), Twin(twin.truth, twin.replicates) if twin else None)
 
 
@@ -184,18 +184,18 @@ def _source(target: TargetSection, places: Places) -> str | None:
         return None
     if given and (beside := [*given[1:], *numbers]):
         rule = "takes pictures, a file, or mean, sd and n; one of them"
-        raise StudyError(rule, f"{given[0]} and {', '.join(beside)}", places.of(("target", given[0])))
+        raise StudyError(places.of(("target", given[0])), rule, f"{given[0]} and {', '.join(beside)}")
     return given[0] if given else None
 
 
 def _check_name(section: ResponseSection, others: Sequence[Response], path: KeyPath, places: Places) -> None:
     names = [other.name for other in others]
     if section.title in names:
-        rule = f"each response has a name of its own, other than {', '.join(map(repr, names))}; set name"
-        raise StudyError(rule, section.title, places.of(path))
+        rule = f"expected each response has a name of its own, other than {', '.join(map(repr, names))}; set name"
+        raise StudyError(places.of(path), rule, section.title)
     if (section.scene, section.observable) in [(other.scene, other.observable) for other in others]:
         rule = "is to be matched already: one response for each observable of a scene"
-        raise StudyError(rule, section.observable, places.of((*path, "observable")))
+        raise StudyError(places.of((*path, "observable")), rule, section.observable)
 
 
 def _observable(
@@ -204,14 +204,14 @@ def _observable(
     if section.scene not in scenes:
         known_scenes = nearest_name(section.scene, list(scenes))
         rule = f"must name a [response-scene.NAME] or a [condition.NAME], {known_scenes}"
-        raise StudyError(rule, section.scene, places.of((*path, "scene")))
+        raise StudyError(places.of((*path, "scene")), rule, section.scene)
     scene = scenes[section.scene]
     known = observables_of(scene.observables, scene.leaves_a_heap)
     if section.weights is not None:
         return _combined(section.weights, known, path, places)
     if section.observable not in known:
         rule = f"must be what the scene measures, {nearest_name(section.observable, list(known))}"
-        raise StudyError(rule, section.observable, places.of((*path, "observable")))
+        raise StudyError(places.of((*path, "observable")), rule, section.observable)
     return known[section.observable]
 
 
@@ -223,10 +223,10 @@ def _combined(
     for name in weights:
         if name not in known:
             raise StudyError(
-                f"must name what the scene measures, {nearest_name(name, list(known))}", name, place
+                place, f"must name what the scene measures, {nearest_name(name, list(known))}", name
             )
     found = [known[name] for name in weights]
     if len({each.unit for each in found}) > 1:
         units = ", ".join(f"{each.name} [{each.unit}]" for each in found)
-        raise StudyError("must name observables of one unit", units, place)
+        raise StudyError(place, "must name observables of one unit", units)
     return found[0]

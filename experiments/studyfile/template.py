@@ -28,10 +28,10 @@ def new_study_path(name: str, folder: Path | None = None) -> Path:
     """Return the path of a new study file of a grain's name; errors as by `write_template`."""
     name = name.removesuffix(".toml")
     if not name or not all(character.isalnum() or character in " _-" for character in name):
-        raise InputError("a name has letters, digits, spaces, - and _ only", name, "NAME")
+        raise InputError("NAME", "a name has letters, digits, spaces, - and _ only", name)
     if is_device_name(name) or name != name.strip():
-        rule = "a name has no blank at its ends, and is none of a device of Windows (con, nul, com1, ...)"
-        raise InputError(rule, repr(name), "NAME")
+        rule = "expected a name has no blank at its ends, and is none of a device of Windows (con, nul, com1, ...)"
+        raise InputError("NAME", rule, repr(name))
     path = (folder or Path()) / f"{name}.toml"
     require_new_file(path, "a new study")
     return path

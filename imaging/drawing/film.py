@@ -98,9 +98,9 @@ def save_film(path: str | Path, pictures: Sequence[Picture], each: float) -> Non
     """
     kind = Path(path).suffix.lower()
     if kind not in KINDS:
-        raise PictureError(f"a film ends in {' or '.join(KINDS)}", kind or "no ending", str(path))
+        raise PictureError(str(path), f"expected a film ends in {' or '.join(KINDS)}", kind or "no ending")
     if not pictures:
-        raise PictureError("a film has at least one picture", 0, str(path))
+        raise PictureError(str(path), "expected a film has at least one picture", 0)
     (_save_gif if kind == ".gif" else _save_mp4)(str(path), pictures, each)
 
 
@@ -125,4 +125,4 @@ def _save_mp4(path: str, pictures: Sequence[Picture], each: float) -> None:
                 writer.write(np.ascontiguousarray(picture[:rows, :columns]))
             writer.release()
             return
-    raise PictureError(f"this OpenCV writes MP4 as {' or '.join(CODECS)}", "neither", path)
+    raise PictureError(path, f"expected this OpenCV writes MP4 as {' or '.join(CODECS)}", "neither")

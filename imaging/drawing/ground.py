@@ -39,6 +39,6 @@ def find_ground(spheres: Spheres) -> float:
     resting = np.searchsorted(lowest, lowest + layer, side="right") - np.arange(len(lowest))
     first = int(np.argmax(resting))
     if resting[first] < LEAST_RESTING:
-        rule = f"at least {LEAST_RESTING} spheres rest on the plate: give its height"
-        raise PictureError(rule, f"{resting[first]} at one height", "plate")
+        rule = f"expected at least {LEAST_RESTING} spheres rest on the plate: give its height"
+        raise PictureError("plate", rule, f"{resting[first]} at one height")
     return float(np.median(lowest[first : first + resting[first]]))

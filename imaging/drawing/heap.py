@@ -73,7 +73,9 @@ class HeapOutlines:
             except PictureError as error:
                 rejections.append(str(error))
         if len(views) < 2:
-            raise PictureError("at least two views show a measurable heap", "; ".join(rejections), "heap")
+            raise PictureError(
+                "heap", "expected at least two views show a measurable heap", "; ".join(rejections)
+            )
         se, dof = _heap_error(views)
         return HeapAngle(
             mean=float(np.mean([view.mean for view in views])),
@@ -144,7 +146,7 @@ def heap_angle(
     settings = FitSettings.of(fit)
     grains = np.size(radii) if grain_count is None else grain_count
     if grains < LEAST_GRAINS:
-        raise PictureError(f"a heap has at least {LEAST_GRAINS} grains", grains, "heap")
+        raise PictureError("heap", f"expected a heap has at least {LEAST_GRAINS} grains", grains)
     return heap_outlines(centers, radii, azimuths, pixels, backend).angle(settings)
 
 
@@ -155,11 +157,11 @@ def _place(azimuth: float) -> str:
 def _directions(azimuths: int | Sequence[float]) -> FloatArray:
     if isinstance(azimuths, int):
         if azimuths < 2:
-            raise PictureError("there are at least two azimuths", azimuths, "azimuths")
+            raise PictureError("azimuths", "expected there are at least two azimuths", azimuths)
         return np.arange(azimuths) * np.pi / azimuths
     directions = np.asarray(azimuths, dtype=np.float64)
     if directions.ndim != 1 or len(directions) < 2 or not np.isfinite(directions).all():
-        raise PictureError("azimuths are at least two finite directions", azimuths, "azimuths")
+        raise PictureError("azimuths", "expected azimuths are at least two finite directions", azimuths)
     return directions
 
 

@@ -58,7 +58,9 @@ def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
 def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture:
     """Lit spheres, (rows, columns, 4) blue-green-red and opacity: as `raster.shaded`, with pyvista."""
     if not opengl_works():
-        raise PictureError("VTK can draw off screen (EGL or OSMesa)", "no OpenGL driver", "backend 'pyvista'")
+        raise PictureError(
+            "backend 'pyvista'", "expected VTK can draw off screen (EGL or OSMesa)", "no OpenGL driver"
+        )
     import pyvista
 
     rows, columns = frame.shape

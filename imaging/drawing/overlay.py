@@ -64,8 +64,8 @@ def _mark(canvas: Picture, text: str, unit: float) -> None:
 def _same_scale(snapshot: Snapshot, angle: ReposeAngle) -> Snapshot:
     scale = angle.outline.meters_per_pixel
     if scale is None or not np.isclose(scale, snapshot.meters_per_pixel, rtol=1e-9):
-        rule = f"the snapshot has the scale of the measured one, {scale} m per pixel"
-        raise PictureError(rule, snapshot.meters_per_pixel, "snapshot")
+        rule = f"expected the snapshot has the scale of the measured one, {scale} m per pixel"
+        raise PictureError("snapshot", rule, snapshot.meters_per_pixel)
     return snapshot
 
 

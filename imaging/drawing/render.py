@@ -108,7 +108,7 @@ def _renderer(backend: str) -> Renderer:
         return opengl if opengl.opengl_works() else raster
     renderers: dict[str, Renderer] = {"raster": raster, "pyvista": opengl}
     if backend not in renderers:
-        raise PictureError("the backend is raster, pyvista or auto", repr(backend), "backend")
+        raise PictureError("backend", "expected the backend is raster, pyvista or auto", repr(backend))
     return renderers[backend]
 
 
@@ -118,7 +118,7 @@ def _sphere_colors(grains: ArrayLike | None, sphere_count: int) -> FloatArray:
         return np.tile(GRAIN_COLOR, (sphere_count, 1))
     owner = np.asarray(grains)
     if owner.shape != (sphere_count,):
-        raise PictureError("there is one grain number for each sphere", owner.shape, "grains")
+        raise PictureError("grains", "expected there is one grain number for each sphere", owner.shape)
     _, rank = np.unique(owner, return_inverse=True)
     lightness = 1.0 + SHADE_SPREAD * np.random.default_rng(0).standard_normal(rank.max() + 1)
     return np.clip(np.outer(lightness[rank], GRAIN_COLOR), 0.0, 255.0)

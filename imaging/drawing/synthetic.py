@@ -43,10 +43,10 @@ class DrawnHeap:
     def __post_init__(self) -> None:
         for name, angle in (("left", self.left), ("right", self.right)):
             if not 0.0 < angle < 80.0:
-                raise PictureError("0 < angle < 80 degrees", angle, name)
+                raise PictureError(name, "expected 0 < angle < 80 degrees", angle)
         if not (self.width > 0.0 and 0.0 <= self.rounding < 1.0 and 0.0 <= self.grain < 0.25 * self.width):
-            rule = "width > 0, 0 <= rounding < 1 and 0 <= grain < width / 4"
-            raise PictureError(rule, (self.width, self.rounding, self.grain), "drawn heap")
+            rule = "expected width > 0, 0 <= rounding < 1 and 0 <= grain < width / 4"
+            raise PictureError("drawn heap", rule, (self.width, self.rounding, self.grain))
 
     @property
     def apex(self) -> FloatArray:

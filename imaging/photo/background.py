@@ -91,7 +91,7 @@ def contrast_with_background(
         thresholds.append(threshold)
         values = values[values <= threshold]
     if not thresholds:
-        raise PictureError("a heap stands out of the background", _why_none(noise), place)
+        raise PictureError(place, "expected a heap stands out of the background", _why_none(noise))
     return Contrast(contrast, tuple(thresholds), noise, smooth, background)
 
 
@@ -141,10 +141,10 @@ def otsu_threshold(values: Layer) -> float:
 def _channels(picture: Picture, place: str) -> Layer:
     layered = picture[:, :, None] if picture.ndim == 2 else picture
     if layered.ndim != 3 or layered.shape[2] not in (1, 3) or picture.dtype != np.uint8:
-        rule = "a picture is a (rows, columns) or (rows, columns, 3) array of uint8"
-        raise PictureError(rule, f"{picture.shape} of {picture.dtype}", place)
+        rule = "expected a picture is a (rows, columns) or (rows, columns, 3) array of uint8"
+        raise PictureError(place, rule, f"{picture.shape} of {picture.dtype}")
     if min(layered.shape[:2]) < 16:
-        raise PictureError("a picture has at least 16 rows and columns", picture.shape, place)
+        raise PictureError(place, "expected a picture has at least 16 rows and columns", picture.shape)
     return layered.astype(np.float32)
 
 

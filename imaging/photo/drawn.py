@@ -51,12 +51,12 @@ def _standing_on(plate: PlateLine, front: NDArray[np.bool_], place: str) -> NDAr
     """The largest piece above the plate line; refuse one of several, and one that a border crops."""
     above = plate.above(front)
     if not above.any():
-        raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
+        raise PictureError(place, "expected a heap stands on the plate", "nothing above the plate line")
     heap, next_share = largest_pieces(above)
     for border, name in ((heap[:, 0], "left"), (heap[:, -1], "right"), (heap[0], "top")):
         if border.any():
-            rule = "the whole heap is in the picture"
-            raise PictureError(rule, f"a heap cropped by the {name} border", place)
+            rule = "expected the whole heap is in the picture"
+            raise PictureError(place, rule, f"a heap cropped by the {name} border")
     if next_share > RIVAL_SHARE:
-        raise PictureError("one heap stands on the plate", "several pieces of like size", place)
+        raise PictureError(place, "expected one heap stands on the plate", "several pieces of like size")
     return heap

@@ -140,8 +140,8 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
     seen = contrast_with_background(picture, place, np.float32)
     best, finding = _best_seen(seen, given, view, place)
     if best.crooked > NO_HEAP:
-        rule = "two straight flanks meet at the tip of a heap"
-        raise PictureError(rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines", place)
+        rule = "expected two straight flanks meet at the tip of a heap"
+        raise PictureError(place, rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines")
     shaded = shaded_edge(seen, best.sighting.rows, best.sighting.plate)
     doubted = _doubt_of_shade(shaded, best, place)
     if shaded.share > MOST_SHADED:

@@ -35,7 +35,7 @@ DEEP_FOOT = 0.05
 """Depth of a foot over its width, a camera 6 degrees up, from which on its colour is asked for."""
 LEAST_WIDTH = 100.0
 """Width [pixels] below which the base of a heap is not looked at: a blurred edge is as wide as the strips."""
-BRIMFUL_RULE = "the heap stands on a plate wider than itself"
+BRIMFUL_RULE = "expected the heap stands on a plate wider than itself"
 BESIDE_NOISE, BESIDE_DIFFERENCE = 6.0, 24.0
 """Multiple of the wall's noise, and difference [of 255], from which on two sides differ: twice a cloth's."""
 FADED = 0.7
@@ -94,12 +94,12 @@ def _on_plate(
     Without `shelf` no plate's edge is looked for beside the heap.
     """
     if not front.any():
-        raise PictureError("a heap stands out of the background", "nothing that does", place)
+        raise PictureError(place, "expected a heap stands out of the background", "nothing that does")
     body, _ = largest_pieces(front)
     plate = _plate_of(body, seen, threshold, place, shelf) if given is None else given
     above = plate.above(front)
     if not above.any():
-        raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
+        raise PictureError(place, "expected a heap stands on the plate", "nothing above the plate line")
     heap = _chosen_piece(above, plate, view, place)
     if given is None and plate.visible and _floats(heap, plate):
         # What was taken for the plate lies before the heap's foot: the front of a table as pale as the wall.
@@ -107,16 +107,16 @@ def _on_plate(
         plate = _plate_of(body, seen, threshold, place)
         heap = plate.above(heap)
         if not heap.any():
-            raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
+            raise PictureError(place, "expected a heap stands on the plate", "nothing above the plate line")
     sought = given is None and plate.visible
     if sought and is_lowest_row(seen.colors, heap, body, plate, _least_difference(seen)):
         return _on_plate(front, seen, threshold, given, view, place, shelf=False)
     if borders := cropping_borders(heap):
-        rule = "the whole heap is in the picture"
-        raise PictureError(rule, f"no heap, or one cropped by the {borders}", place)
+        rule = "expected the whole heap is in the picture"
+        raise PictureError(place, rule, f"no heap, or one cropped by the {borders}")
     if not plate.visible and body[-1].any():
-        rule = "the heap stands on its plate, its whole foot in the picture"
-        raise PictureError(rule, "no heap, or one that goes on below the bottom border", place)
+        rule = "expected the heap stands on its plate, its whole foot in the picture"
+        raise PictureError(place, rule, "no heap, or one that goes on below the bottom border")
     return plate, body, heap
 
 
@@ -143,12 +143,12 @@ def _chosen_piece(above: NDArray[np.bool_], plate: PlateLine, view: View, place:
     if view.heap is not None:
         if view.heap > len(large):
             shown = f"{len(large)} heap{'s' if len(large) > 1 else ''}"
-            raise PictureError(f"the picture shows {shown}", f"heap {view.heap}", place)
+            raise PictureError(place, f"expected the picture shows {shown}", f"heap {view.heap}")
         return np.asarray(labels == large[view.heap - 1])
     if len(large) > 1:
-        rule = "one heap stands on the plate, and nothing of its size beside it (cut it out, or choose one)"
+        rule = "expected one heap stands on the plate, and nothing of its size beside it (cut it out, or choose one)"
         raise PictureError(
-            rule, f"several pieces of like size, {len(large)}: a second heap or objects", place
+            place, rule, f"several pieces of like size, {len(large)}: a second heap or objects"
         )
     return np.asarray(labels == large[0])
 
@@ -273,19 +273,19 @@ def refuse_brimful(seen: Contrast, found: Sighting, ends: tuple[float, float], p
         low = _sampled(seen, found.plate, across, -found.depth * np.linspace(0.3, 0.7, 8))
         high = _sampled(seen, found.plate, across, float(height.max()) * np.linspace(0.1, 0.3, 8))
         if low is not None and high is not None and min(_differ(low, high), _differ(high, low)) > least:
-            raise PictureError(BRIMFUL_RULE, "a dish, or an object of another colour below it", place)
+            raise PictureError(place, BRIMFUL_RULE, "a dish, or an object of another colour below it")
     strips = _beside(seen, found, ends)
     if strips is None:
         return
     under, *sides = strips
     if all(_differ(under, side) > least for side in sides):
-        raise PictureError(BRIMFUL_RULE, "a dish, or a narrow board", place)
+        raise PictureError(place, BRIMFUL_RULE, "a dish, or a narrow board")
     lower = _strips(seen, found, ends, np.linspace(0.1, 0.14, 8), np.linspace(-0.04, 0.0, 20))
     if lower is None:
         return
     below, *corners = lower
     if all(_differ(below, corner) > least for corner in corners):
-        raise PictureError(BRIMFUL_RULE, "a dish, round below", place)
+        raise PictureError(place, BRIMFUL_RULE, "a dish, round below")
 
 
 def darker_below(seen: Contrast, found: Sighting, ends: tuple[float, float]) -> bool:
@@ -383,8 +383,8 @@ def _differ(one: Layer, other: Layer) -> float:
 def _raised(base: Base, rows: FloatArray, plate: PlateLine, place: str) -> tuple[PlateLine, float, float]:
     """The line at which the straight outline of a cone ends, and the camera's height, from its base."""
     if base.depth > VIEW_FROM_ABOVE * base.half_width:
-        rule = "the picture shows the heap from the side"
-        raise PictureError(rule, f"a view from above, by some {base.elevation:.0f} degrees", place)
+        rule = "expected the picture shows the heap from the side"
+        raise PictureError(place, rule, f"a view from above, by some {base.elevation:.0f} degrees")
     tip = np.nanmax(base.row + base.slope * np.arange(len(rows)) - rows)
     # The tangents from the tip touch the ellipse this far above its middle.
     touch = base.depth**2 / max(float(tip), 1.0)

@@ -42,15 +42,17 @@ class View:
         if self.crop is not None and not (
             0 <= self.crop[0] < self.crop[2] and 0 <= self.crop[1] < self.crop[3]
         ):
-            raise PictureError("left < right and top < bottom, from 0 on", self.crop, "crop")
+            raise PictureError("crop", "expected left < right and top < bottom, from 0 on", self.crop)
         if self.plate is not None and not self.plate[0] < self.plate[2]:
-            raise PictureError("x1 < x2: the plate's line from left to right", self.plate, "plate")
+            raise PictureError("plate", "expected x1 < x2: the plate's line from left to right", self.plate)
         if self.heap is not None and self.heap < 1:
-            raise PictureError("heaps are counted from 1", self.heap, "heap")
+            raise PictureError("heap", "expected heaps are counted from 1", self.heap)
         if self.elevation is not None and not 0.0 <= self.elevation < 45.0:
-            raise PictureError("0 <= elevation < 45 degrees", self.elevation, "elevation")
+            raise PictureError("elevation", "expected 0 <= elevation < 45 degrees", self.elevation)
         if self.distance is not None and not self.distance > LEAST_DISTANCE:
-            raise PictureError("the camera is more than one heap width away", self.distance, "distance")
+            raise PictureError(
+                "distance", "expected the camera is more than one heap width away", self.distance
+            )
 
     def distance_of(self, width: float) -> float | None:
         """Distance [heap widths] from the camera to a heap of this width [pixels], if it is known."""
@@ -68,8 +70,8 @@ class View:
         """
         left, top, right, bottom = self.crop or (0, 0, shape[1], shape[0])
         if right > shape[1] or bottom > shape[0]:
-            rule = f"the crop lies in the picture of {shape[1]} x {shape[0]} pixels"
-            raise PictureError(rule, (left, top, right, bottom), place)
+            rule = f"expected the crop lies in the picture of {shape[1]} x {shape[0]} pixels"
+            raise PictureError(place, rule, (left, top, right, bottom))
         return slice(top, bottom), slice(left, right)
 
 

@@ -102,10 +102,10 @@ def test_a_reference_that_is_all_noise_has_no_slope() -> None:
 @pytest.mark.parametrize(
     ("arguments", "rule"),
     [
-        (([1.0, 2.0], [1.0, 2.0]), r"3 or more runs, received shapes \(2,\) and \(2,\)"),
+        (([1.0, 2.0], [1.0, 2.0]), r"3 or more runs, got shapes \(2,\) and \(2,\)"),
         (([1.0, 2.0, 3.0], [1.0, 2.0]), "the same 3 or more runs"),
         (([1.0, 2.0, math.nan], [1.0, 2.0, 3.0]), "finite values"),
-        (([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], -1.0), "variances must be 0 or more, received -1.0"),
+        (([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], -1.0), "variances must be 0 or more, got -1.0"),
         (([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], 0.0, 0.0, ["a"]), r"settings must be a label for each of 3 runs"),
     ],
 )

@@ -23,7 +23,7 @@ def test_one_sample_test_is_that_of_scipy():
     theirs = stats.ttest_1samp(A, 30.0)
     ours = compare_means(A, 30.0, method="one-sample")
     assert (ours.t, ours.p, ours.df) == pytest.approx((theirs.statistic, theirs.pvalue, 3), rel=1e-12)
-    with pytest.raises(DesignError, match=r"a known number, .*received Sample\(mean=30.0, sd=0.5, n=5\)"):
+    with pytest.raises(DesignError, match=r"a known number, .*got Sample\(mean=30.0, sd=0.5, n=5\)"):
         compare_means(A, Sample(30.0, 0.5, 5), method="one-sample")
 
 
@@ -74,9 +74,9 @@ def test_means_that_differ_by_the_margin_pass_as_equivalent_in_five_percent():
         (([1.0], [1.0, 2.0]), "at least 2 values"),
         (([1.0, np.nan], [1.0, 2.0]), "nan at position 2"),
         (([1.0, 1.0], [1.0, 1.0]), "no test without spread"),
-        (([1.0, 2.0], [1.0, 3.0], 0.0), "margin must be positive, received 0"),
-        (([1.0, 2.0], [1.0, 3.0], 1.0, "paired"), "received 'paired'"),
-        (([1.0, 2.0], [1.0, 3.0], 1.0, "welch", 5.0), "alpha lies between 0 and 1, received 5"),
+        (([1.0, 2.0], [1.0, 3.0], 0.0), "margin must be positive, got 0"),
+        (([1.0, 2.0], [1.0, 3.0], 1.0, "paired"), "got 'paired'"),
+        (([1.0, 2.0], [1.0, 3.0], 1.0, "welch", 5.0), "alpha lies between 0 and 1, got 5"),
         (([1.0, 2.0], 1.5), "a plain number has no spread"),
     ],
 )
@@ -87,5 +87,5 @@ def test_refuses(arguments, message):
 
 @pytest.mark.parametrize("arguments", [(np.nan, 1.0, 3), (1.0, -1.0, 3), (1.0, 1.0, 1), (1.0, 1.0, 2.5)])
 def test_sample_refuses(arguments):
-    with pytest.raises(DesignError, match="received"):
+    with pytest.raises(DesignError, match="got"):
         Sample(*arguments)

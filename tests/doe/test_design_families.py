@@ -207,7 +207,7 @@ def test_latin_hypercube_has_one_run_in_every_slice():
 def test_sobol_is_balanced_and_refuses_other_sizes():
     design = sobol(factors(4), 16)
     assert (np.sort(np.floor((design.coded.to_numpy() + 1.0) * 8.0), axis=0) == np.arange(16)[:, None]).all()
-    with pytest.raises(DesignError, match="such as 8 or 16; received 12"):
+    with pytest.raises(DesignError, match="such as 8 or 16, got 12"):
         sobol(factors(4), 12)
 
 

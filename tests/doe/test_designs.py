@@ -35,9 +35,9 @@ def test_label_leaves_out_the_unit_one():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("x", 2.0, 1.0), "low must be below high, received 2.0 and 1.0"),
+        (("x", 2.0, 1.0), "low must be below high, got 2.0 and 1.0"),
         (("x", 1.0, 1.0), "low must be below high"),
-        (("x", float("nan"), 1.0), "factor 'x': low must be finite, received nan"),
+        (("x", float("nan"), 1.0), "factor 'x': low must be finite, got nan"),
         (("x", 0.0, float("inf")), "high must be finite"),
         (("", 0.0, 1.0), "name is not empty"),
         (("a:b", 0.0, 1.0), "'a:b'"),
@@ -96,9 +96,9 @@ def test_default_size_is_the_smallest_that_holds_the_factors(count, runs):
 @pytest.mark.parametrize(
     ("runs", "message"),
     [
-        (8, "8 factors need at least 9 runs, received 8"),
-        (14, "multiple of 4.*received 14"),
-        (92, "received 92"),
+        (8, "8 factors need at least 9 runs, got 8"),
+        (14, "multiple of 4.*got 14"),
+        (92, "got 92"),
     ],
 )
 def test_screening_design_refuses(runs, message):
@@ -161,10 +161,10 @@ def test_rotatable_prediction_variance_depends_on_the_radius_alone(count):
     [
         (
             {"alpha": "corner"},
-            "alpha is one of rotatable, face, spherical, orthogonal, blocks or a number, received 'corner'",
+            "alpha is one of rotatable, face, spherical, orthogonal, blocks or a number, got 'corner'",
         ),
-        ({"alpha": 0.0}, "alpha must be positive and finite, received 0"),
-        ({"center": -1}, "at least 0, received -1"),
+        ({"alpha": 0.0}, "alpha must be positive and finite, got 0"),
+        ({"center": -1}, "at least 0, got -1"),
     ],
 )
 def test_composite_refuses(options, message):
@@ -173,7 +173,7 @@ def test_composite_refuses(options, message):
 
 
 def test_composite_refuses_too_many_factors():
-    with pytest.raises(DesignError, match="1 to 10 factors, received 11"):
+    with pytest.raises(DesignError, match="1 to 10 factors, got 11"):
         central_composite(factors(11))
 
 
@@ -219,14 +219,14 @@ def test_table_refuses(table, message):
 
 def test_table_refuses_a_run_label_twice():
     table = pd.DataFrame({"x1": [1.0, -1.0]}, index=[3, 3])
-    with pytest.raises(DesignError, match="run label comes once, received again: 3"):
+    with pytest.raises(DesignError, match="run label comes once, got again: 3"):
         Design.from_table(table, factors(1))
 
 
 def test_design_refuses_no_factor_and_a_name_twice():
     with pytest.raises(DesignError, match="at least one factor"):
         plackett_burman([])
-    with pytest.raises(DesignError, match="received twice: x1"):
+    with pytest.raises(DesignError, match="got twice: x1"):
         central_composite([*factors(1), *factors(1)])
 
 

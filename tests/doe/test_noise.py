@@ -79,11 +79,11 @@ def test_detectable_effect_has_its_power():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: noise_floor([1.0, 2.0], confidence=95.0), "received 95"),
-        (lambda: variance_ratio(1.0, 3, 0.0, 4), "error_ms must be positive and finite, received 0"),
+        (lambda: noise_floor([1.0, 2.0], confidence=95.0), "got 95"),
+        (lambda: variance_ratio(1.0, 3, 0.0, 4), "error_ms must be positive and finite, got 0"),
         (lambda: curvature_test([1.0, 2.0], [3.0, 3.0]), "centers that spread"),
-        (lambda: effect_power(1.0, -2.0, 12, 3), "sd must be positive and finite, received -2"),
-        (lambda: detectable_effect(0.0, 12, 3), "sd must be positive and finite, received 0"),
+        (lambda: effect_power(1.0, -2.0, 12, 3), "sd must be positive and finite, got -2"),
+        (lambda: detectable_effect(0.0, 12, 3), "sd must be positive and finite, got 0"),
         (lambda: detectable_effect(1.0, 12, 3, power=0.01), "power lies between alpha"),
     ],
 )

@@ -112,7 +112,7 @@ def test_projection_is_the_shadow_on_two_factors():
     assert np.array_equal(shadow, shadow.T)
     # A ball of radius 1/2 casts a disc; 54 cells a side: half a cell of its rim.
     assert shadow.mean() == pytest.approx(np.pi * 0.25 / 4.0, abs=np.pi / 4.0 / 54)
-    with pytest.raises(DesignError, match="two of x1, x2, x3, received 'x1' and 'x1'"):
+    with pytest.raises(DesignError, match="two of x1, x2, x3, got 'x1' and 'x1'"):
         band.projection("x1", "x1")
 
 
@@ -130,7 +130,7 @@ def test_compatible_region_of_no_match_is_empty():
     region = surface_of(lambda x, y: 30.0 + x + y, 2, noise=0.1).compatible_region(40.0, 0.1)
     assert region.fraction == 0.0
     assert region.ranges.isna().to_numpy().all()
-    with pytest.raises(DesignError, match="target_se must be finite and not negative, received -1"):
+    with pytest.raises(DesignError, match="target_se must be finite and not negative, got -1"):
         surface_of(lambda x, y: x, 2, noise=0.1).compatible_region(0.0, -1.0)
 
 

@@ -73,7 +73,7 @@ def test_grid_of_three_factors_holds_the_third():
 
 
 @pytest.mark.parametrize(
-    ("x", "message"), [("Z", "no factor is named 'Z'"), ("F", "different factors, received 'F' twice")]
+    ("x", "message"), [("Z", "no factor is named 'Z'"), ("F", "different factors, got 'F' twice")]
 )
 def test_grid_refuses(reduced, x, message):
     with pytest.raises(DesignError, match=message):

@@ -109,7 +109,7 @@ def test_interaction_of_a_geometric_design_falls_into_one_column():
 @pytest.mark.parametrize(
     ("response", "message"),
     [
-        (np.zeros(11), r"shape \(12,\) or \(12, replicates\), received \(11,\)"),
+        (np.zeros(11), r"shape \(12,\) or \(12, replicates\), got \(11,\)"),
         (np.r_[np.zeros(6), np.nan, np.zeros(5)], "nan in run 7, replicate 1"),
         (np.where(np.arange(24) == 23, np.inf, 0.0).reshape(12, 2), "inf in run 12, replicate 2"),
     ],
@@ -121,7 +121,7 @@ def test_response_is_checked(response, message):
 
 def test_rule_and_aliased_factors_are_named():
     design = plackett_burman(FACTORS)
-    with pytest.raises(DesignError, match="error is one of pooled, dummies, pure, lenth, received 'none'"):
+    with pytest.raises(DesignError, match="error is one of pooled, dummies, pure, lenth, got 'none'"):
         screen(design, np.zeros(12), error="none")
     with pytest.raises(DesignError, match="nothing to fit: all 12 observations are 5"):
         screen(design, np.full(12, 5.0))

@@ -85,8 +85,8 @@ def test_climb_table_averages_replicates(plane):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"steps": 0}, "steps of a path must be a whole number of at least 1, received 0"),
-        ({"step": -1.0}, "step must be positive and finite, received -1"),
+        ({"steps": 0}, "steps of a path must be a whole number of at least 1, got 0"),
+        ({"step": -1.0}, "step must be positive and finite, got -1"),
         ({"step": {"A": 1.0}}, "'B' has None"),
         ({"step": {"D": 1.0}}, "step names 'D'"),
         ({"factors": ["D"]}, "no factor is named 'D'"),

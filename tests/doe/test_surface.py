@@ -172,8 +172,8 @@ def test_refuses_what_cannot_be_estimated():
     [
         (lambda s: s.drop("A^3"), r"no term 'A\^3'; it has A, B"),
         (lambda s: s.predict({"A": 1.0}), "no value for factor 'B'"),
-        (lambda s: s.equation("metric"), "one of natural, coded, received 'metric'"),
-        (lambda s: fit_surface(s.design, s.response, "cubic"), "received 'cubic'"),
+        (lambda s: s.equation("metric"), "one of natural, coded, got 'metric'"),
+        (lambda s: fit_surface(s.design, s.response, "cubic"), "got 'cubic'"),
         (lambda s: fit_surface(s.design, s.response.replace(1.0, np.nan)), "nan in run 2"),
     ],
 )

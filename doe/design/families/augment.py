@@ -26,11 +26,11 @@ def join(*designs: Design, blocks: Sequence | None = None) -> Design:
     for design in designs:
         checked_kind("design", design, Design)
     if len(designs) < 2:
-        raise DesignError(f"join takes two or more designs, received {len(designs)}")
+        raise DesignError(f"join takes two or more designs, got {len(designs)}")
     first = designs[0]
     labels = list(range(1, len(designs) + 1)) if blocks is None else checked_list("blocks", blocks)
     if len(labels) != len(designs) or len(set(labels)) < len(labels):
-        raise DesignError(f"blocks: a different label for each of {len(designs)} designs, received {labels}")
+        raise DesignError(f"blocks: a different label for each of {len(designs)} designs, got {labels}")
     for design in designs[1:]:
         if design.names != first.names or [f.unit for f in design.factors] != [f.unit for f in first.factors]:
             raise DesignError(f"designs of the same factors are joined: {first.names} and {design.names}")
@@ -67,7 +67,7 @@ def foldover(design: Design, factors: Sequence[str] | None = None) -> Design:
         else [design.factor(name).name for name in checked_list("factors", factors)]
     )
     if not turned:
-        raise DesignError("a foldover turns the signs of at least one factor, received none")
+        raise DesignError("a foldover turns the signs of at least one factor, got none")
     many = [f.name for f in design.factors if isinstance(f, Category) and len(f.levels) > 2]
     if many:
         raise DesignError(f"a category of more than two levels has no mirror image: {many[0]!r}")

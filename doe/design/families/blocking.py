@@ -31,7 +31,7 @@ def block_labels(coded: NDArray[np.float64], blocks: int) -> NDArray[np.int64]:
     count = int(math.log2(blocks))
     if 2**count != blocks or blocks >= len(coded) or not (np.abs(coded) == 1.0).all():
         raise DesignError(
-            f"blocks of a two-level design: 2, 4, ... and fewer than its {len(coded)} runs, received {blocks}"
+            f"blocks of a two-level design: 2, 4, ... and fewer than its {len(coded)} runs, got {blocks}"
         )
     factor_count = coded.shape[1]
     words = [

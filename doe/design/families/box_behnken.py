@@ -54,7 +54,7 @@ def box_behnken(
     factors = numeric_factors(factors, "a Box-Behnken design")
     count = len(factors)
     if count not in TOGETHER:
-        raise DesignError(f"a Box-Behnken design takes 3 to 7 factors, received {count}")
+        raise DesignError(f"a Box-Behnken design takes 3 to 7 factors, got {count}")
     pieces = _pieces(count)
     if checked_flag("blocks", blocks) and len(pieces) == 1:
         raise DesignError("the Box-Behnken design of 3 factors has no orthogonal blocks")
@@ -63,7 +63,7 @@ def box_behnken(
     center = CENTERS[count] if center is None else checked_count("center", center, least=0, most=MOST)
     if center % len(pieces):
         raise DesignError(
-            f"center is the number of center runs, shared by {len(pieces)} blocks; received {center}"
+            f"center is the number of center runs, shared by {len(pieces)} blocks, got {center}"
         )
     each = np.zeros((center // len(pieces), count))
     pieces = [np.vstack([piece, each]) for piece in pieces]

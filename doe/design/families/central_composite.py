@@ -94,7 +94,7 @@ def two_level_part(factor_count: int, full: bool = False) -> NDArray[np.float64]
     """Return the -1 / +1 runs: all corners up to 4 factors, else a fraction of resolution V or more."""
     if factor_count > max(FRACTIONS):
         raise DesignError(
-            f"a central composite design takes 1 to {max(FRACTIONS)} factors, received {factor_count}"
+            f"a central composite design takes 1 to {max(FRACTIONS)} factors, got {factor_count}"
         )
     further = () if full else FRACTIONS.get(factor_count, ())
     basic = basic_factorial(factor_count - len(further))
@@ -103,7 +103,7 @@ def two_level_part(factor_count: int, full: bool = False) -> NDArray[np.float64]
 
 def _corner_blocks(corners: NDArray[np.float64], blocks: int) -> list[NDArray[np.float64]]:
     if blocks not in (1, 2, 3, 5):
-        raise DesignError(f"a central composite design has 1, 2, 3 or 5 blocks, received {blocks}")
+        raise DesignError(f"a central composite design has 1, 2, 3 or 5 blocks, got {blocks}")
     labels = block_labels(corners, max(blocks - 1, 1))
     return [corners[labels == label] for label in range(1, int(labels.max()) + 1)]
 
@@ -114,7 +114,7 @@ def _centers(center: int | tuple[int, int], blocks: int) -> tuple[int, int]:
         count = checked_count("center", center, least=0, most=MOST)
         return (count if blocks > 1 else 0), count
     if len(center) != 2:
-        raise DesignError(f"center is one or two numbers of center runs, received {center}")
+        raise DesignError(f"center is one or two numbers of center runs, got {center}")
     cube, star = (checked_count("center", count, least=0, most=MOST) for count in center)
     return cube, star
 
@@ -135,6 +135,6 @@ def _axial_distance(
     }
     if isinstance(alpha, str):
         if alpha not in named:
-            raise DesignError(f"alpha is one of {', '.join(ALPHAS)} or a number, received {alpha!r}")
+            raise DesignError(f"alpha is one of {', '.join(ALPHAS)} or a number, got {alpha!r}")
         return named[alpha]
     return checked_number("alpha", alpha, above=0.0)

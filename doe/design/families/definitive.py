@@ -38,12 +38,12 @@ def definitive_screening(
     factors = numeric_factors(factors, "a definitive screening design")
     if not 3 <= len(factors) <= MOST_FACTORS:
         raise DesignError(
-            f"a definitive screening design takes 3 to {MOST_FACTORS} factors, received {len(factors)}"
+            f"a definitive screening design takes 3 to {MOST_FACTORS} factors, got {len(factors)}"
         )
     center = checked_count("center", center, most=MOST)
     order = len(factors) + checked_count("spare", spare, least=0)
     if order > 2 * MOST_FACTORS:
-        raise DesignError(f"factors and spare columns are at most {2 * MOST_FACTORS}, received {order}")
+        raise DesignError(f"factors and spare columns are at most {2 * MOST_FACTORS}, got {order}")
     while not has_conference(order):
         order += 1
     half = conference_matrix(order)[:, : len(factors)]

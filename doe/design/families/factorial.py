@@ -71,7 +71,7 @@ def full_factorial(
     given = [levels] * len(factors) if isinstance(levels, int) else checked_list("levels", levels)
     counts = [checked_count("levels", count, least=2, most=MOST) for count in given]
     if len(counts) != len(factors):
-        raise DesignError(f"levels: two or more for each of {len(factors)} factors, received {levels}")
+        raise DesignError(f"levels: two or more for each of {len(factors)} factors, got {levels}")
     grids = [
         np.array(factor.codes) if isinstance(factor, Category) else np.linspace(-1.0, 1.0, count)
         for factor, count in zip(factors, counts, strict=True)
@@ -164,7 +164,7 @@ def _from_catalogue(
     if count not in CATALOGUE.get(runs, {}):
         sizes = [size for size, table in CATALOGUE.items() if count in table]
         raise DesignError(
-            f"{count} factors have fractions of {sizes or 'no'} runs in the catalogue, received {runs}; name "
+            f"{count} factors have fractions of {sizes or 'no'} runs in the catalogue, got {runs}; name "
             "the generators, or use plackett_burman"
         )
     basic = basic_factorial(int(math.log2(runs)))
@@ -198,7 +198,7 @@ def _generated(names: list[str], generators: Sequence[str]) -> tuple[NDArray[np.
     further: dict[str, NDArray[np.float64]] = {}
     for text in generators:
         if not isinstance(text, str):
-            raise DesignError(f"a generator is text such as 'D = A:B:C', received {text!r}")
+            raise DesignError(f"a generator is text such as 'D = A:B:C', got {text!r}")
         name, equal, word = (part.strip() for part in text.partition("="))
         parts = [part.strip() for part in word.lstrip("+-").split(":")]
         strangers = [part for part in parts if part not in basic_names]
@@ -206,7 +206,7 @@ def _generated(names: list[str], generators: Sequence[str]) -> tuple[NDArray[np.
             raise DesignError(
                 f"a generator gives one of {', '.join(names[len(basic_names) :])} as a product of "
                 f"{', '.join(basic_names)}, such as {names[-1]!r} = {':'.join(basic_names[:2])!r}; "
-                f"received {text!r}"
+                f"got {text!r}"
             )
         sign = -1.0 if word.startswith("-") else 1.0
         further[name] = sign * basic[:, [basic_names.index(part) for part in parts]].prod(axis=1)

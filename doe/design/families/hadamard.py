@@ -56,7 +56,7 @@ def screening_matrix(runs: int, factor_count: int | None = None) -> Matrix:
     if not candidates:
         raise DesignError(
             f"runs must be a multiple of 4 with a known construction (92, 116 and few others lack one here), "
-            f"received {runs}"
+            f"got {runs}"
         )
     return min(candidates, key=lambda matrix: worst_alias(matrix[:, : factor_count or runs - 1]))
 

@@ -53,7 +53,7 @@ class Mixture:
         for name in self.shares.columns:
             real_array(f"the shares of {name!r}", self.shares[name])
         if self.shares.empty:
-            raise DesignError("a mixture has at least one blend, received an empty table")
+            raise DesignError("a mixture has at least one blend, got an empty table")
         totals = self.shares.sum(axis=1)
         off = totals.index[~((totals - 1.0).abs() <= TOLERANCE)]
         if len(off) or not (self.shares >= -TOLERANCE).all(axis=None):
@@ -133,9 +133,9 @@ def _checked(components: Sequence[str]) -> list[str]:
     names = checked_list("components", components)
     for name in names:
         if not isinstance(name, str):
-            raise DesignError(f"a component's name is text, received {name!r}")
+            raise DesignError(f"a component's name is text, got {name!r}")
     if len(names) < 2 or len(set(names)) < len(names):
-        raise DesignError(f"a mixture has two or more different components, received {components!r}")
+        raise DesignError(f"a mixture has two or more different components, got {components!r}")
     return names
 
 
@@ -150,6 +150,6 @@ def _scaled(
         [checked_number(f"the least share of {name!r}", lower.get(name, 0.0), least=0.0) for name in names]
     )
     if not least.sum() < 1.0:
-        raise DesignError(f"least shares are not negative and add up to less than 1, received {lower}")
+        raise DesignError(f"least shares are not negative and add up to less than 1, got {lower}")
     table = pd.DataFrame(least + (1.0 - least.sum()) * shares, columns=names)
     return Mixture(numbered(table), lower, seed)

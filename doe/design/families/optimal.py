@@ -86,7 +86,7 @@ def optimal_design(
         expanded = np.column_stack([expanded, np.broadcast_to(blocks, (len(expanded), len(blocks)))])
     count = expanded.shape[1]
     if len(kept) + runs < count:
-        raise DesignError(f"{count} coefficients need as many runs, received {len(kept) + runs}")
+        raise DesignError(f"{count} coefficients need as many runs, got {len(kept) + runs}")
     if np.linalg.matrix_rank(np.vstack([expanded, kept])) < count:
         raise DesignError(
             f"the {len(candidates)} runs that the constraints allow cannot tell {count} coefficients "
@@ -110,7 +110,7 @@ def allowed(
     mask = np.ones(len(coded), dtype=bool)
     for rule in checked_list("constraints", constraints):
         if not isinstance(rule, str) and not callable(rule):
-            raise DesignError(f"a constraint is text such as 'v0 < v1' or a function, received {rule!r}")
+            raise DesignError(f"a constraint is text such as 'v0 < v1' or a function, got {rule!r}")
         try:
             held = natural.eval(rule, engine="python") if isinstance(rule, str) else rule(natural)
         except Exception as error:

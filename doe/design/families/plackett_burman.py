@@ -56,7 +56,7 @@ def plackett_burman(factors: Iterable[Factor], runs: int | None = None, seed: in
             runs += 4
     runs = checked_count("runs", runs, most=MOST_RUNS)
     if runs < len(factors) + 1:
-        raise DesignError(f"{len(factors)} factors need at least {len(factors) + 1} runs, received {runs}")
+        raise DesignError(f"{len(factors)} factors need at least {len(factors) + 1} runs, got {runs}")
     matrix = screening_matrix(runs, len(factors))
     names = [factor.name for factor in factors]
     dummies = tuple(f"dummy{number}" for number in range(1, runs - len(factors)))

@@ -122,7 +122,7 @@ def power_table(
     alpha = checked_level(alpha)
     sizes = [checked_number("an effect", effect) for effect in checked_list("effects", effects)]
     if not sizes:
-        raise DesignError("a power table takes one effect or more, received none")
+        raise DesignError("a power table takes one effect or more, got none")
     matrix = _full_matrix(design, model)
     columns = model_columns(design.points, design.factors, model)
     count = columns.shape[1]

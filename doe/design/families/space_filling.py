@@ -59,7 +59,7 @@ def sobol(factors: Iterable[Factor], runs: int, *, seed: int | None = None) -> D
     if runs & (runs - 1):
         below = 1 << max(runs.bit_length() - 1, 1)
         raise DesignError(
-            f"a Sobol design has a power of two of runs, such as {below} or {2 * below}; received {runs}"
+            f"a Sobol design has a power of two of runs, such as {below} or {2 * below}, got {runs}"
         )
     seed = checked_seed(seed)
     sampler = qmc.Sobol(len(factors), scramble=seed is not None, rng=np.random.default_rng(seed or 0))

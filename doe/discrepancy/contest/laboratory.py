@@ -77,7 +77,7 @@ class Laboratory:
         ]
         if len(outcomes.reasons) != len(cases):
             rule = f"needs an outcome for each of {len(cases)} points"
-            raise RuleError(rule, len(outcomes.reasons), "wave")
+            raise RuleError("wave", rule, len(outcomes.reasons))
         self.cases += len(cases)
         self.failures += int((~outcomes.finished).sum())
         owners = np.array([number for number, _, _ in cases])

@@ -98,10 +98,10 @@ class Bank:
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.theta), len(self.observables)):
             rule = "needs a row a case and a column an observable"
-            raise RuleError(rule, self.values.shape, "Bank.values")
+            raise RuleError("Bank.values", rule, self.values.shape)
         self._check_columns()
         if not np.isfinite(self.values[self.finished]).all():
-            raise RuleError("is finite wherever a case finished", "NaN", "Bank.values")
+            raise RuleError("Bank.values", "is finite wherever a case finished", "NaN")
 
     def _check_columns(self) -> None:
         rows = len(self.theta)
@@ -112,18 +112,18 @@ class Bank:
         }
         for name, shape in shapes.items():
             if (found := getattr(self, name).shape) != shape:
-                raise RuleError(f"has the shape {shape}", found, f"Bank.{name}")
+                raise RuleError(f"Bank.{name}", f"has the shape {shape}", found)
         if rows == 0:
-            raise RuleError("has at least one case", "none", "Bank.values")
+            raise RuleError("Bank.values", "has at least one case", "none")
         ranges = {"mechanism": (-1, len(space.names)), "condition": (0, len(space.conditions))}
         for name, (least, end) in ranges.items():
             numbers = getattr(self, name)
             if numbers.dtype.kind not in "iu" or not (least <= numbers.min() <= numbers.max() < end):
-                raise RuleError(f"numbers from {least} to {end - 1}", numbers.dtype, f"Bank.{name}")
+                raise RuleError(f"Bank.{name}", f"numbers from {least} to {end - 1}", numbers.dtype)
         if not (np.isfinite(self.theta).all() and np.isfinite(self.coded_size).all()):
-            raise RuleError("is finite", "NaN", "Bank.theta, Bank.coded_size")
+            raise RuleError("Bank.theta, Bank.coded_size", "is finite", "NaN")
         if self.reasons.dtype.kind != "U":
-            raise RuleError("is text", self.reasons.dtype, "Bank.reasons")
+            raise RuleError("Bank.reasons", "is text", self.reasons.dtype)
 
     @cached_property
     def finished(self) -> np.ndarray:
@@ -210,7 +210,7 @@ def load_bank(path: Path) -> Bank:
         return Bank(space, names, **columns, study=made_for, maker=made_by, kriged=kriged)
     except Exception as error:
         # the libraries raise whatever their parsers happen to meet in a damaged file
-        raise RuleError("must be a bank that this program wrote", str(error), str(path)) from error
+        raise RuleError(str(path), "must be a bank that this program wrote", str(error)) from error
 
 
 def _read_columns(path: Path) -> dict[str, Any]:
@@ -245,7 +245,7 @@ def make_bank(
         For a point with two mechanisms: a bank knows none or one at a time.
     """
     if any(len(point.sizes) > 1 for point in points):
-        raise RuleError("has at most one mechanism in a case", "two", "points of a bank")
+        raise RuleError("points of a bank", "has at most one mechanism in a case", "two")
     names = space.names
     sizes = [point.sizes[0] if point.sizes else None for point in points]
     coded = [0.0 if entry is None else space.coded_size(*entry) for entry in sizes]

@@ -74,7 +74,7 @@ def fit_emulator(bank: Bank) -> Emulator:
     """
     finished = bank.values[bank.finished]
     if not len(finished):
-        raise RuleError("needs finished cases", "none", "bank")
+        raise RuleError("bank", "needs finished cases", "none")
     spread = np.ptp(finished, axis=0)
     columns = np.flatnonzero(spread > 0.0)
     notes = [
@@ -129,7 +129,7 @@ def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray, known: KrigedPart
         try:
             data.append((theta, values, repeats_of(theta, values)))
         except RuleError as error:
-            raise RuleError(error.rule, error.value, f"condition {condition} of the bank") from error
+            raise RuleError(f"condition {condition} of the bank", error.problem, error.value) from error
     noises = fit_noises([repeats for _, _, repeats in data], floor)
     parts = [None if known is None else known.of_surface(number, BASE) for number in range(len(data))]
     runs = [

@@ -61,14 +61,14 @@ class KrigedParts:
             When a place is no whole number, or an amplitude or a length is not positive.
         """
         if table.ndim != 2 or table.shape[1] <= _PLACE or table.dtype.kind != "f":
-            raise RuleError("is a table of numbers, a row for each part", table.shape, "Bank.kriged")
+            raise RuleError("Bank.kriged", "is a table of numbers, a row for each part", table.shape)
         parts: dict[tuple[int, int], dict[int, Covariance]] = {}
         for row in table:
             scales = row[_PLACE:][~np.isnan(row[_PLACE:])]
             if not (np.isfinite(scales).all() and (scales > 0.0).all() and len(scales) > 1):
-                raise RuleError("has positive amplitudes and lengths", row, "Bank.kriged")
+                raise RuleError("Bank.kriged", "has positive amplitudes and lengths", row)
             if not (row[:_PLACE] == np.round(row[:_PLACE])).all() or row[:_PLACE].min() < BASE or row[2] < 0:
-                raise RuleError("numbers its parts by whole numbers", row, "Bank.kriged")
+                raise RuleError("Bank.kriged", "numbers its parts by whole numbers", row)
             condition, mechanism, column = (int(number) for number in row[:_PLACE])
             parts.setdefault((condition, mechanism), {})[column] = Covariance(float(scales[0]), scales[1:])
         return cls(runs, parts)
@@ -97,12 +97,12 @@ class Rest:
     def _as_known(self, column: int, covariance: Covariance) -> Kriging:
         if column >= self.missed.shape[1] or len(covariance.length) != self.points.shape[1]:
             rule = "needs kriged parts of its own columns and factors"
-            raise RuleError(rule, f"column {column}, {len(covariance.length)} lengths", "Bank.kriged")
+            raise RuleError("Bank.kriged", rule, f"column {column}, {len(covariance.length)} lengths")
         try:
             return krige(*self._data(column), covariance)
         except (np.linalg.LinAlgError, ValueError) as error:
             rule = "needs kriged parts whose covariance can be inverted"
-            raise RuleError(rule, f"an amplitude of {covariance.amplitude:g}", "Bank.kriged") from error
+            raise RuleError("Bank.kriged", rule, f"an amplitude of {covariance.amplitude:g}") from error
 
     def _data(self, column: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.points, self.missed[:, column], self.noise[:, column]

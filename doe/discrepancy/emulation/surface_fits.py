@@ -57,7 +57,7 @@ def repeats_of(theta: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.nd
     rows, deviations = repeat_deviations(groups.reshape(-1), values)
     if len(rows) <= values.shape[1] + 1 or len(points) <= quadratic(points).shape[1]:
         rule = "needs more points without a mechanism than polynomial terms, and repeats than observables"
-        raise RuleError(rule, f"{len(points)} points, {len(rows)} repeats", "bank")
+        raise RuleError("bank", rule, f"{len(points)} points, {len(rows)} repeats")
     return theta[rows], deviations
 
 

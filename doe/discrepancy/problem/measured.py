@@ -27,7 +27,7 @@ class Calibration:
     def __post_init__(self) -> None:
         for name in ("offset", "scale"):
             if not (math.isfinite(value := getattr(self, name)) and value >= 0.0):
-                raise RuleError("must be a number, 0 or more", value, f"Calibration.{name}")
+                raise RuleError(f"Calibration.{name}", "must be a number, 0 or more", value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +57,11 @@ class Measured:
     def __post_init__(self) -> None:
         for what, names in (("conditions", self.conditions), ("observables", self.observables)):
             if not names or len(set(names)) < len(names):
-                raise RuleError("needs at least one, each once", names, f"Measured.{what}")
+                raise RuleError(f"Measured.{what}", "needs at least one, each once", names)
         if set(self.values) != set(self.conditions):
-            raise RuleError("holds every condition and no other", sorted(self.values), "Measured.values")
+            raise RuleError("Measured.values", "holds every condition and no other", sorted(self.values))
         if strange := [name for name in self.calibration if name not in self.observables]:
-            raise RuleError("is of measured observables", strange, "Measured.calibration")
+            raise RuleError("Measured.calibration", "is of measured observables", strange)
         formed = {name: tuple("" for _ in rows) for name, rows in self.values.items()}
         object.__setattr__(self, "reasons", {**formed, **self.reasons})
         for name, rows in self.values.items():
@@ -71,14 +71,14 @@ class Measured:
         place = f"Measured.values[{name!r}]"
         if rows.ndim != 2 or len(rows) == 0 or rows.shape[1] != len(self.observables):
             rule = f"is a row a replicate, with a column for each of {len(self.observables)} observables"
-            raise RuleError(rule, f"shape {rows.shape}", place)
+            raise RuleError(place, rule, f"shape {rows.shape}")
         if np.isinf(rows).any():
-            raise RuleError("is finite, or NaN where nothing was measured", "an infinite value", place)
+            raise RuleError(place, "is finite, or NaN where nothing was measured", "an infinite value")
         if len(self.reasons[name]) != len(rows):
             rule = "has one entry a replicate, empty where it did not fail"
-            raise RuleError(rule, self.reasons[name], f"Measured.reasons[{name!r}]")
+            raise RuleError(f"Measured.reasons[{name!r}]", rule, self.reasons[name])
         if np.isfinite(rows[[bool(reason) for reason in self.reasons[name]]]).any():
-            raise RuleError("is NaN in the row of a replicate that failed", "a number", place)
+            raise RuleError(place, "is NaN in the row of a replicate that failed", "a number")
 
     def finished_count(self, condition: str) -> int:
         """Replicates of a condition that did not fail."""
@@ -123,7 +123,7 @@ class Measured:
         kept = [index for index, name in enumerate(self.observables) if name in wanted]
         if not kept:
             rule = f"must name measured observables, of {', '.join(self.observables)}"
-            raise RuleError(rule, sorted(wanted), "observables")
+            raise RuleError("observables", rule, sorted(wanted))
         names = tuple(self.observables[index] for index in kept)
         return replace(
             self,

@@ -75,20 +75,20 @@ class Settings:
     def __post_init__(self) -> None:
         for name in ("false_alarm", "fit_level", "power"):
             if not 0.0 < getattr(self, name) < 1.0:
-                raise RuleError("must lie between 0 and 1", getattr(self, name), f"Settings.{name}")
+                raise RuleError(f"Settings.{name}", "must lie between 0 and 1", getattr(self, name))
         least = {"bank_points": 10, "bank_repeats": 2, "bank_mechanism_points": 4, "draws": 100}
         least |= {"shortlist": 1, "refinement_points": 2, "refinement_repeats": 2, "refinement_rounds": 1}
         least |= {"finish_points": 0, "pair_candidates": 0, "direct_runs": 2}
         for name, value in least.items():
             if not isinstance(getattr(self, name), Integral):
-                raise RuleError("must be a whole number", getattr(self, name), f"Settings.{name}")
+                raise RuleError(f"Settings.{name}", "must be a whole number", getattr(self, name))
             if getattr(self, name) < value:
-                raise RuleError(f"must be at least {value}", getattr(self, name), f"Settings.{name}")
+                raise RuleError(f"Settings.{name}", f"must be at least {value}", getattr(self, name))
             if getattr(self, name) > MOST:
-                raise RuleError(f"must be at most {MOST:,}", getattr(self, name), f"Settings.{name}")
+                raise RuleError(f"Settings.{name}", f"must be at most {MOST:,}", getattr(self, name))
         for name in ("least_ratio", "pair_ratio", "tie_margin", "systematic", "shortlist_share"):
             if not getattr(self, name) >= 0.0:
-                raise RuleError("must not be negative", getattr(self, name), f"Settings.{name}")
+                raise RuleError(f"Settings.{name}", "must not be negative", getattr(self, name))
 
     @property
     def text(self) -> str:
@@ -116,6 +116,6 @@ def settings_of(document: Mapping[str, Any], place: str) -> Settings:
     known = {field.name for field in fields(Settings)}
     for name in document:
         if name not in known:
-            raise RuleError(f"must be one of {', '.join(sorted(known))}", name, place)
+            raise RuleError(place, f"must be one of {', '.join(sorted(known))}", name)
     named = document.get("resolvable")
     return Settings(**{**document, "resolvable": None if named is None else tuple(named)})

@@ -37,11 +37,11 @@ class MechanismRange:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.null) and math.isfinite(self.maximum)) or self.null == self.maximum:
-            raise RuleError("needs a null and another maximum", (self.null, self.maximum), self.name)
+            raise RuleError(self.name, "needs a null and another maximum", (self.null, self.maximum))
         least = LEAST_SATURATION * abs(self.width)
         if self.saturation is not None and not least <= self.saturation < math.inf:
             raise RuleError(
-                f"saturates over a hundredth of its range ({least:.6g}) at least", self.saturation, self.name
+                self.name, f"saturates over a hundredth of its range ({least:.6g}) at least", self.saturation
             )
 
     def coded(self, natural: float) -> float:
@@ -88,16 +88,16 @@ class SearchSpace:
     def __post_init__(self) -> None:
         if not len(self.factors) == len(self.lower) == len(self.upper) or not self.factors:
             raise RuleError(
-                "needs a range for each of at least one factor", self.factors, "SearchSpace.factors"
+                "SearchSpace.factors", "needs a range for each of at least one factor", self.factors
             )
         for name, low, high in zip(self.factors, self.lower, self.upper, strict=True):
             if not low < high:
-                raise RuleError("must run from its lower to its upper end", (low, high), f"factor {name}")
+                raise RuleError(f"factor {name}", "must run from its lower to its upper end", (low, high))
         if len(self.held_out) != len(self.conditions) or all(self.held_out):
-            raise RuleError("needs at least one condition to fit", self.conditions, "SearchSpace.conditions")
+            raise RuleError("SearchSpace.conditions", "needs at least one condition to fit", self.conditions)
         names = [*self.conditions, *self.factors, *(m.name for m in self.mechanisms)]
         if len(set(names)) < len(names):
-            raise RuleError("are named once each", names, "conditions, factors and mechanisms of SearchSpace")
+            raise RuleError("conditions, factors and mechanisms of SearchSpace", "are named once each", names)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -109,7 +109,7 @@ class SearchSpace:
         for mechanism in self.mechanisms:
             if mechanism.name == name:
                 return mechanism
-        raise RuleError(f"must be a mechanism of the library, one of {', '.join(self.names)}", name, "name")
+        raise RuleError("name", f"must be a mechanism of the library, one of {', '.join(self.names)}", name)
 
     def without(self, *names: str) -> SearchSpace:
         """Return the same space with some mechanisms withheld."""

@@ -233,5 +233,5 @@ def _check(name: str, tables: Data | Fit, shape: tuple[int, int], fields: tuple[
             received = getattr(tables, field).shape
             raise ValueError(
                 f"Discovery.{name}.{field} needs a row a condition and a column an observable, {shape}"
-                f" (received {received})"
+                f", got {received}"
             )

@@ -80,7 +80,7 @@ def _best(first: Fitted, second: Fitted, replicates: int, wanted_q: float) -> Ne
         if best is None or expected > best[0]:
             best = (expected, condition, emulator.observables[int(np.argmax(np.abs(contrast)))])
     if best is None:
-        raise ValueError(f"a next experiment needs a condition (received {emulator.space.conditions})")
+        raise ValueError(f"a next experiment needs a condition, got {emulator.space.conditions}")
     titles = (_title(first), _title(second))
     return NextExperiment(best[1], (), titles, best[0], replicates, best[2], wanted_q)
 

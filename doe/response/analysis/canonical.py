@@ -123,7 +123,7 @@ def ridge_path(
     checked_kind("surface", surface, Surface)
     radii = real_array("radii", radii)
     if radii.ndim != 1 or not np.isfinite(radii).all() or (radii < 0.0).any() or radii.size == 0:
-        raise DesignError(f"radii are finite and not negative, received {radii.tolist()}")
+        raise DesignError(f"radii are finite and not negative, got {radii.tolist()}")
     form = surface.quadratic_form
     sign = -1.0 if checked_flag("descend", descend) else 1.0
     rising = QuadraticForm(sign * form.constant, sign * form.slopes, sign * form.matrix)

@@ -60,18 +60,18 @@ class Wish:
         if self.target is not None:
             checked_number("target of a wish", self.target)
         if not (np.isfinite(self.low) and np.isfinite(self.high) and self.low < self.high):
-            raise DesignError(f"a wish has low < high, both finite; received {self.low} and {self.high}")
+            raise DesignError(f"a wish has low < high, both finite, got {self.low} and {self.high}")
         if self.target is not None and not self.low < self.target < self.high:
-            raise DesignError(f"a target lies between {self.low} and {self.high}, received {self.target}")
+            raise DesignError(f"a target lies between {self.low} and {self.high}, got {self.target}")
         checked_flag("larger", self.larger)
         checked_number("importance of a wish", self.importance, above=0.0)
         weights = self.weight if isinstance(self.weight, tuple) else (self.weight,)
         for weight in weights:
             checked_number("weight of a wish", weight, above=0.0)
         if not 1 <= len(weights) <= 2:
-            raise DesignError(f"a wish has one weight, or two with a target: received {self.weight}")
+            raise DesignError(f"a wish has one weight, or two with a target, got {self.weight}")
         if self.target is None and len(weights) > 1:
-            raise DesignError(f"a wish without target has one weight, received {self.weight}")
+            raise DesignError(f"a wish without target has one weight, got {self.weight}")
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the desirability of responses."""
@@ -192,7 +192,7 @@ def checked_surfaces(surfaces: Mapping[str, Surface]) -> Design:
     """Return the design of surfaces by response; raise DesignError unless they have the same factors."""
     given = checked_map("surfaces", surfaces)
     if not given:
-        raise DesignError("surfaces holds one fitted surface or more by response, received none")
+        raise DesignError("surfaces holds one fitted surface or more by response, got none")
     for name, surface in given.items():
         checked_kind(f"surface of {name!r}", surface, Surface)
     first = next(iter(given.values())).design

@@ -113,7 +113,7 @@ def box_cox(surface: Surface, confidence: float = 0.95) -> BoxCox:
             f"Box-Cox takes positive responses; the smallest is {response.min():g}: add a constant"
         )
     if not 0.0 < confidence < 1.0:
-        raise DesignError(f"confidence lies between 0 and 1, received {confidence}")
+        raise DesignError(f"confidence lies between 0 and 1, got {confidence}")
     basis = np.linalg.qr(np.asarray(surface.fit.model.exog))[0]
     scaled = np.log(response / np.exp(np.log(response).mean()))
 

@@ -104,9 +104,9 @@ def fit_formula(design: Design, response: ArrayLike, formula: str, *, coded: boo
     """
     checked_kind("design", design, Design)
     if not isinstance(formula, str):
-        raise DesignError(f"formula is text such as 'A * B', received {formula!r}")
+        raise DesignError(f"formula is text such as 'A * B', got {formula!r}")
     if "~" in formula:
-        raise DesignError(f"formula is the right-hand side alone, such as 'A * B'; received {formula!r}")
+        raise DesignError(f"formula is the right-hand side alone, such as 'A * B', got {formula!r}")
     observed, values = observations(design, response)
     table = (design.points if checked_flag("coded", coded) else design.natural).loc[observed.index].copy()
     for factor in design.factors:
@@ -139,7 +139,7 @@ def fit_mixture(mixture: Mixture, response: ArrayLike, model: str = "quadratic")
     values = real_array("response", response)
     if values.ndim not in (1, 2) or len(values) != len(mixture.shares) or not np.isfinite(values).all():
         raise DesignError(
-            f"a response has a finite value for each of {len(mixture.shares)} blends, received "
+            f"a response has a finite value for each of {len(mixture.shares)} blends, got "
             f"shape {values.shape}"
         )
     if isinstance(response, pd.Series | pd.DataFrame) and not response.index.equals(mixture.shares.index):

@@ -86,12 +86,12 @@ def command_program(
     try:
         first, *others = words_of(command)
     except ValueError as error:
-        raise InputError(str(error) or "must name a program", command, place) from None
+        raise InputError(place, str(error) or "must name a program", command) from None
     beside = folder / first
     program = str(beside.resolve()) if beside.is_file() else shutil.which(first)
     if program is None or (beside.is_file() and shutil.which(program) is None):
         rule = f"must begin with a program that can be run: on the PATH, or a file in {folder.resolve()}"
-        raise InputError(rule, first, place)
+        raise InputError(place, rule, first)
     words = [str((folder / word).resolve()) if (folder / word).is_file() else word for word in others]
     return CommandProgram((program, *words), version, observables)
 
@@ -293,7 +293,7 @@ def read_heap(path: Path) -> tuple[np.ndarray, np.ndarray]:
         found = read_spheres(path)
     except InputError as error:
         place = error.place.replace(str(path), path.name)
-        raise AnswerError(f"{place}: {error.rule}, got {_shown(error.value)}") from error
+        raise AnswerError(f"{place}: {error.problem}, got {_shown(error.value)}") from error
     bodies = np.arange(len(found.spheres)) if found.bodies is None else found.bodies
     return found.spheres * (found.unit or 1.0), np.unique(bodies, return_inverse=True)[1].ravel()
 

@@ -61,7 +61,7 @@ class Driver:
         test = ExportedTest(self.name, case, "the case")
         translation = export_input(test, self.name, self.approximate, APPROXIMATE)
         if not (translation.command and translation.heap):
-            raise InputError("must be a code whose input can be run here", self.name, "engine")
+            raise InputError("engine", "must be a code whose input can be run here", self.name)
         return translation
 
     def _located(self, translation: Translation) -> str:
@@ -69,7 +69,7 @@ class Driver:
         if path := shutil.which(program):
             return path
         rule = f"{EXPORTERS[self.name].code} must be installed, its program on the PATH"
-        raise InputError(rule, program, "engine")
+        raise InputError("engine", rule, program)
 
 
 @cache

@@ -42,9 +42,11 @@ def with_engine(study: Study, name: str | None = None, command: str | None = Non
     if name is None and command is None:
         return study
     if name is not None and command is not None:
-        raise InputError("an engine is given by its name or by its command", f"{name}; {command}", "engine")
+        raise InputError(
+            "engine", "expected an engine is given by its name or by its command", f"{name}; {command}"
+        )
     if name is not None and name not in ENGINES:
-        raise InputError(f"must be one of {', '.join(ENGINES) or 'none'}", name, "engine")
+        raise InputError("engine", f"must be one of {', '.join(ENGINES) or 'none'}", name)
     document = study.document
     kept = {key: value for key, value in document.get("engine", {}).items() if key not in ("name", "command")}
     if command is not None:
@@ -83,10 +85,12 @@ def engine_of(study: Study) -> Engine | None:
             check(study.case({}, seed=0))
         except InputError as error:
             # each on its own line: a code may lack more than one message holds
-            found = (Problem(problem.rule, problem.value, place) for problem in error.problems)
+            found = (Problem(place, problem.problem, problem.value) for problem in error.problems)
             raise StudyError.of(found) from None
         except ValueError as error:
-            raise StudyError(f"{section.name} cannot run this study: {error}", section.name, place) from None
+            raise StudyError(
+                place, f"expected {section.name} cannot run this study: {error}", section.name
+            ) from None
     return engine
 
 
@@ -94,18 +98,22 @@ def _engine_named(section: EngineSection, place: str) -> Engine:
     """Engine of a section's name, with the section's limits."""
     if section.name is None or section.name not in ENGINES:
         rule = f"must be one of {', '.join(ENGINES) or 'none'}"
-        raise StudyError(rule, section.name, f"{place}.name")
+        raise StudyError(f"{place}.name", rule, section.name)
     engine = ENGINES[section.name]
     if section.version or section.observables:
-        rule = "version and observables belong to a command; an engine of a name knows its own"
-        raise StudyError(rule, section.version or list(section.observables), place)
+        rule = "expected version and observables belong to a command; an engine of a name knows its own"
+        raise StudyError(place, rule, section.version or list(section.observables))
     driver = engine.program if isinstance(engine, ProgramEngine) else None
     if section.approximate and not isinstance(driver, Driver):
-        raise StudyError("belongs to the codes that a case is exported to", True, f"{place}.approximate")
+        raise StudyError(
+            f"{place}.approximate", "expected belongs to the codes that a case is exported to", True
+        )
     if isinstance(driver, Driver):
         return ProgramEngine(Driver(driver.name, section.approximate), section.workers, section.time_limit)
     if isinstance(engine, ProgramEngine):
         return replace(engine, workers=section.workers, time_limit=section.time_limit)
     if section.time_limit is not None:
-        raise StudyError("this engine runs no program that a limit could end", section.time_limit, place)
+        raise StudyError(
+            place, "expected this engine runs no program that a limit could end", section.time_limit
+        )
     return engine

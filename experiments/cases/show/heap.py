@@ -137,9 +137,9 @@ def filmed_by(study: Study, workers: Workers) -> OwnWorkers:
     """
     if engine_of(study) is not None:
         other = study.engine and (study.engine.name or study.engine.command)
-        raise InputError("must run on dem-warp's own engine", other, "--frames")
+        raise InputError("--frames", "must run on dem-warp's own engine", other)
     if not isinstance(workers, OwnWorkers):
-        raise InputError("must run on this machine", workers.machine, "--frames")
+        raise InputError("--frames", "must run on this machine", workers.machine)
     return workers
 
 

@@ -38,9 +38,9 @@ def require_movie(kind: str | None, frames: int | None) -> None:
     if kind is None:
         return
     if frames is None:
-        raise InputError("a film is made of frames: --frames N says of how many", kind, "--movie")
+        raise InputError("--movie", "expected a film is made of frames: --frames N says of how many", kind)
     if kind not in MOVIES:
-        raise InputError(f"must be one of {', '.join(MOVIES)}", kind, "--movie")
+        raise InputError("--movie", f"must be one of {', '.join(MOVIES)}", kind)
 
 
 def write_movie(film: Film, path: Path) -> None:

@@ -47,10 +47,12 @@ def locked(folder: Path, resume: bool = False) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         lock.acquire()
     except Timeout:
-        raise StoreError("one run at a time works in a folder", "another at work", str(folder)) from None
+        raise StoreError(
+            str(folder), "expected one run at a time works in a folder", "another at work"
+        ) from None
     except OSError as error:
         rule = "a folder of results must be one that can be made and written to"
-        raise StoreError(rule, error.strerror or "none", str(folder)) from error
+        raise StoreError(str(folder), rule, error.strerror or "none") from error
     try:
         # another run may have come and gone since
         _require_usable(folder, resume)
@@ -124,7 +126,7 @@ def require_unused(folder: Path, advice: str = "") -> None:
         When the folder is not new or empty.
     """
     if is_used(folder):
-        raise StoreError(f"the output folder must be new or empty{advice}", _kind(folder), str(folder))
+        raise StoreError(str(folder), f"the output folder must be new or empty{advice}", _kind(folder))
 
 
 def _require_usable(folder: Path, resume: bool) -> None:
@@ -132,9 +134,9 @@ def _require_usable(folder: Path, resume: bool) -> None:
         require_unused(folder, "; --resume goes on in it")
     elif not is_used(folder):
         rule = "a folder to resume must be that of an earlier run: without --resume, a new one is made"
-        raise StoreError(rule, "none" if not folder.exists() else "an empty one", str(folder))
+        raise StoreError(str(folder), rule, "none" if not folder.exists() else "an empty one")
     elif not folder.is_dir():
-        raise StoreError(f"a folder to resume must hold a {MANIFEST}", _kind(folder), str(folder))
+        raise StoreError(str(folder), f"a folder to resume must hold a {MANIFEST}", _kind(folder))
     else:
         _require_no_links(folder)
         _require_stored_cases(folder)
@@ -153,13 +155,13 @@ def _require_no_links(folder: Path) -> None:
     for place, folders, files in os.walk(folder):
         for name in (*folders, *files):
             if (path := Path(place, name)).is_symlink():
-                raise StoreError("a folder to resume must hold no links", "a link", str(path))
+                raise StoreError(str(path), "a folder to resume must hold no links", "a link")
 
 
 def _require_stored_cases(folder: Path) -> None:
     """Refuse what a case could not be saved over, before it is simulated."""
     if os.path.lexists(cases := folder / CASES) and not cases.is_dir():
-        raise StoreError("must be the folder of the stored cases: move it away", "a file", str(cases))
+        raise StoreError(str(cases), "must be the folder of the stored cases: move it away", "a file")
     for place in (folder, cases):
         for path in place.glob("*.npz"):
             _require_file(path, "a stored case" if place == cases else "a bank")
@@ -168,4 +170,4 @@ def _require_stored_cases(folder: Path) -> None:
 def _require_file(path: Path, what: str) -> None:
     if os.path.lexists(path) and not path.is_file():
         found = "a folder" if path.is_dir() else "a pipe or a device"
-        raise StoreError(f"must be the file of {what}: move it away", found, str(path))
+        raise StoreError(str(path), f"must be the file of {what}: move it away", found)

@@ -72,4 +72,4 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         return manifest
     except (OSError, ValueError, RecursionError):
         rule = f"a folder to resume must hold the {MANIFEST} of the run that made it"
-        raise StoreError(rule, "none that can be read", str(path)) from None
+        raise StoreError(str(path), rule, "none that can be read") from None

@@ -105,10 +105,10 @@ class OutcomeTable:
             rule = (
                 "the table of outcomes must be one that can be read and written: see to room and permissions"
             )
-            raise StoreError(rule, str(error), str(self.path)) from error
+            raise StoreError(str(self.path), rule, str(error)) from error
         except (sqlite3.Error, UnicodeDecodeError) as error:  # of a damaged name in a message
             rule = "must be a table of outcomes that this version wrote: move it away, and they are made anew"
-            raise StoreError(rule, str(error), str(self.path)) from error
+            raise StoreError(str(self.path), rule, str(error)) from error
 
 
 def _whole(row: Sequence[Any]) -> Outcome | None:

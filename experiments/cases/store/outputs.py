@@ -120,7 +120,7 @@ def _read_list(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         pass
     rule = "must be the list of files that a run wrote: move it away, with the outputs that it should name"
-    raise StoreError(rule, "another file", str(path))
+    raise StoreError(str(path), rule, "another file")
 
 
 def _place(folder: Path, name: str) -> Path:

@@ -89,7 +89,7 @@ class Store:
         path = self.path(key)
         if not path.is_file():
             rule = "a stored case must stay until the run has ended: --resume simulates it again"
-            raise StoreError(rule, "no such file", str(path))
+            raise StoreError(str(path), rule, "no such file")
         try:
             values = _read_values(path)
             found = (values.pop("key"), values.pop("format"))
@@ -99,7 +99,7 @@ class Store:
             _check(result)
             return result
         except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-            raise StoreError("a stored case must be whole", f"a damaged file: {error}", str(path)) from error
+            raise StoreError(str(path), "a stored case must be whole", f"a damaged file: {error}") from error
 
 
 def _read_values(path: Path) -> dict[str, Any]:

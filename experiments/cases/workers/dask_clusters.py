@@ -79,7 +79,7 @@ def submitted_jobs(section: ClusterSection, count: int) -> Iterator[tuple[JobQue
         if refusal := submissions.refusal:
             rule = f"jobs must be taken by {submit_command(section.kind)}, which says: {refusal}"
             value = f"kind {section.kind}, queue {section.queue or 'left out'}"
-            raise InputError(rule, value, "cluster")
+            raise InputError("cluster", rule, value)
         yield cluster, submissions
 
 

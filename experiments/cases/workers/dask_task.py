@@ -87,7 +87,7 @@ def simulate_batch(order: Order) -> None:
 
     if fingerprint_of(order.cases) != order.fingerprint:
         rule = "workers must have the same dem-warp as the one that gives the orders"
-        raise InputError(rule, f"another version on {get_worker().address}", "the cluster")
+        raise InputError("the cluster", rule, f"another version on {get_worker().address}")
     with _one_at_a_time:
         line = _Line(order, Queue(order.channel), get_worker())
         wanted = line.ask()

@@ -162,7 +162,7 @@ class DaskWorkers:
         for address, facts in self._there().items():
             if facts["nthreads"] != 1:
                 rule = "each worker must have one thread: dask worker --nthreads 1 --nworkers N"
-                raise InputError(rule, f"{facts['nthreads']} threads of {address}", "the cluster")
+                raise InputError("the cluster", rule, f"{facts['nthreads']} threads of {address}")
 
     def _shares(self) -> _Shares | None:
         """Shares that the workers have of their GPUs; None where one has none."""

@@ -76,7 +76,7 @@ def require_dask() -> None:
     """
     if missing := missing_libraries():
         names = ", ".join(missing)
-        raise InputError(f"several workers need Dask: {EXTRA}", f"not installed: {names}", "workers")
+        raise InputError("workers", f"several workers need Dask: {EXTRA}", f"not installed: {names}")
 
 
 def missing_libraries() -> list[str]:
@@ -112,4 +112,4 @@ def _connected(address: str) -> Client:
         return Client(address, timeout=ANSWER, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         rule = "must be the address of a Dask scheduler that answers, as tcp://HOST:8786"
-        raise InputError(f"{rule} ({type(error).__name__})", address, "--scheduler") from None
+        raise InputError("--scheduler", f"expected {rule} ({type(error).__name__})", address) from None

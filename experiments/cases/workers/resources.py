@@ -40,7 +40,7 @@ class Resources:
         """Refuse what cannot be an address, of which Dask finds out late and with a traceback."""
         if self.scheduler is not None and not _is_address(self.scheduler):
             rule = "must be the address of a Dask scheduler, as tcp://HOST:8786"
-            raise InputError(rule, self.scheduler, "--scheduler")
+            raise InputError("--scheduler", rule, self.scheduler)
 
     @property
     def is_cluster(self) -> bool:
@@ -66,13 +66,15 @@ class Resources:
         devices = resolve_devices(self.device)
         if devices == ["cpu"]:
             if self.cluster is not None and self.cluster.gpu:
-                raise InputError("a worker with a GPU needs one", "none here", "cluster.gpu")
+                raise InputError("cluster.gpu", "a worker with a GPU needs one", "none here")
             return []
         there = devices if self.device else [gpu.alias for gpu in wp.get_cuda_devices()]
         wanted = self.workers or (self.cluster.workers or len(there) if self.cluster else len(devices))
         if wanted > len(there):
-            rule = f"counts GPUs, of {len(there)} here; processes on the CPU are had with --device cpu"
-            raise InputError(rule, wanted, "--workers")
+            rule = (
+                f"expected counts GPUs, of {len(there)} here; processes on the CPU are had with --device cpu"
+            )
+            raise InputError("--workers", rule, wanted)
         return there[:wanted]
 
     @property
@@ -102,16 +104,14 @@ class Resources:
             return len(self.gpus) * self.sharing
         cores = os.cpu_count() or 1
         if asked and asked > MOST_PER_CORE * cores:
-            rule = (
-                f"counts processes of this machine, at most {MOST_PER_CORE} a core: {MOST_PER_CORE * cores}"
-            )
-            raise InputError(rule, asked, self._place_of_workers)
+            rule = f"expected counts processes of this machine, at most {MOST_PER_CORE} a core: {MOST_PER_CORE * cores}"
+            raise InputError(self._place_of_workers, rule, asked)
         return asked or cores
 
     def _in_whole_jobs(self, asked: int, each: int) -> int:
         # Dask would end what is over, with all of its job, and submit that job again, without end
         if asked % each:
-            raise InputError(f"must fill whole jobs of {each} workers", asked, self._place_of_workers)
+            raise InputError(self._place_of_workers, f"must fill whole jobs of {each} workers", asked)
         return asked
 
     @property
@@ -163,9 +163,9 @@ def resolve_devices(names: str | None) -> list[str]:
     try:
         found = [resolve_device(name) for name in asked]
     except ValueError as error:
-        raise InputError(str(error), names, "--device") from None
+        raise InputError("--device", str(error), names) from None
     if len(set(found)) < len(found):
-        raise InputError("must name each device once", names, "--device")
+        raise InputError("--device", "must name each device once", names)
     if len(found) > 1 and "cpu" in found:
-        raise InputError("must be the CPU alone or GPUs only", names, "--device")
+        raise InputError("--device", "must be the CPU alone or GPUs only", names)
     return found

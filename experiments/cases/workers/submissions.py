@@ -62,7 +62,7 @@ def require_submit_command(section: ClusterSection) -> None:
     command = submit_command(section.kind)
     if shutil.which(command) is None:
         rule = f"needs the command {command}, which is not on the PATH: run this where jobs are submitted"
-        raise InputError(rule, section.kind, "cluster.kind")
+        raise InputError("cluster.kind", rule, section.kind)
 
 
 def words_of(error: Exception) -> str:

@@ -61,4 +61,4 @@ def require_run(folder: Path, *names: str) -> None:
     """
     if lacking := [name for name in names if not (folder / name).is_file()]:
         rule = "must be the folder of a finished run: run the study first"
-        raise InputError(rule, f"without {', '.join(lacking)}", str(folder))
+        raise InputError(str(folder), rule, f"without {', '.join(lacking)}")

@@ -48,7 +48,7 @@ def points_of(bank: Bank, search: Search) -> list[Point]:
     drawn = bank_points(bank.space, settings)
     theta = bank.space.coded_theta(np.array([point.theta for point in drawn]))
     if theta.shape != bank.theta.shape or not np.allclose(theta, bank.theta, atol=1e-12):
-        raise InputError("must have the points that are drawn today", f"{len(bank.theta)} others", "the bank")
+        raise InputError("the bank", "must have the points that are drawn today", f"{len(bank.theta)} others")
     return drawn
 
 
@@ -83,7 +83,7 @@ def main(
         print(f"{len(rows) - len(others)} of {len(rows)} runs are the same in every observable: {file}")
         if len(others):
             raise InputError(
-                "must be made by an engine that gives the same values", f"row {others[0]}", str(file)
+                str(file), "must be made by an engine that gives the same values", f"row {others[0]}"
             )
         made = maker_of_today(source_commit())
         with replacing(file) as temporary:

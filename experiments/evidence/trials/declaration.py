@@ -73,7 +73,7 @@ def read_declaration(path: Path) -> Declaration:
     resolvable = settings.pop("resolvable")
     fixed = Settings(**settings, resolvable=None if resolvable is None else tuple(resolvable))
     if fixed.sha256 != sha256:
-        raise InputError(f"settings must have the hash {sha256}", fixed.sha256, str(path))
+        raise InputError(str(path), f"settings must have the hash {sha256}", fixed.sha256)
     library, strangers = (tuple(map(_effect, document.pop(name))) for name in ("library", "strangers"))
     plan = Plan(**document.pop("plan"))
     return Declaration(**document, plan=plan, settings=fixed, library=library, strangers=strangers)

@@ -51,13 +51,13 @@ class Plan:
     def __post_init__(self) -> None:
         object.__setattr__(self, "mechanisms", tuple(self.mechanisms))  # a list, where it comes from a file
         if self.view not in VIEWS:
-            raise InputError(f"must be one of {', '.join(VIEWS)}", self.view, "Plan.view")
+            raise InputError("Plan.view", f"must be one of {', '.join(VIEWS)}", self.view)
         for field in fields(self):
             if field.name in ("mechanisms", "view"):
                 continue
             least = 2 if field.name == "replicates" else 0
             if (count := getattr(self, field.name)) < least:
-                raise InputError(f"is at least {least}", count, f"Plan.{field.name}")
+                raise InputError(f"Plan.{field.name}", f"is at least {least}", count)
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def draw(
         are resolvable.
     """
     if foreign := set(plan.mechanisms) - {effect.name for effect in library}:
-        raise InputError("are mechanisms of the library", sorted(foreign), "Plan.mechanisms")
+        raise InputError("Plan.mechanisms", "expected are mechanisms of the library", sorted(foreign))
     library = [effect for effect in library if not plan.mechanisms or effect.name in plan.mechanisms]
     drafts = [*_alone(plan, library, rng), *_outside(plan, library, strangers, rng)]
     drafts += _pairs(plan, [effect for effect in library if effect.resolvable], rng)
@@ -176,7 +176,7 @@ def _pairs(plan: Plan, resolvable: Sequence[Declared], rng: np.random.Generator)
     """Two mechanisms that can be told apart."""
     partners = [(one, other) for one, other in combinations(resolvable, 2) if other.name not in one.kin]
     if plan.pairs and not partners:
-        raise InputError("pairs need two resolvable mechanisms", [e.name for e in resolvable], "Plan.pairs")
+        raise InputError("Plan.pairs", "pairs need two resolvable mechanisms", [e.name for e in resolvable])
     for _ in range(plan.pairs):
         chosen = partners[rng.integers(len(partners))]
         halves = [_strong("pairs", Kind.PAIR, effect, rng) for effect in chosen]

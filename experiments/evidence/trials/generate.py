@@ -100,8 +100,8 @@ def seal_trials(
         When the folder has sealed trials.
     """
     if folder.sealed.exists():
-        rule = "trials are sealed once: name a folder without any"
-        raise InputError(rule, "sealed trials", str(folder.sealed))
+        rule = "expected trials are sealed once: name a folder without any"
+        raise InputError(str(folder.sealed), rule, "sealed trials")
     study = search.study
     seen = VIEWS[plan.view]
     emulator, known = fit_emulator(bank), stated_scales(seen)

@@ -99,11 +99,13 @@ def unpack_heaps(archive: Path, folder: Folder) -> int:
             entries = packed.infolist()
             for entry in entries:
                 if entry.filename not in known or entry.file_size > LARGEST:
-                    rule = f"holds heaps of sealed trials alone, each of {LARGEST:,} bytes at the most"
-                    raise InputError(rule, entry.filename, str(archive))
+                    rule = (
+                        f"expected holds heaps of sealed trials alone, each of {LARGEST:,} bytes at the most"
+                    )
+                    raise InputError(str(archive), rule, entry.filename)
             for entry in entries:
                 with replacing(folder.measured(known[entry.filename])) as temporary:
                     temporary.write_bytes(packed.read(entry))
     except (OSError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError("must be an archive of measured heaps", str(error), str(archive)) from None
+        raise InputError(str(archive), "must be an archive of measured heaps", str(error)) from None
     return len(entries)

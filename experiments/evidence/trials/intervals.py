@@ -145,7 +145,7 @@ def read_twins(folder: Path) -> pd.DataFrame:
     """
     path = folder / TWINS
     if not path.is_file():
-        raise InputError("needs twins that were analysed", "none", str(path))
+        raise InputError(str(path), "needs twins that were analysed", "none")
     return pd.read_csv(path, dtype={"trial": str, "verdict": str})
 
 

@@ -51,7 +51,7 @@ def read_nulls(folder: Folder, declaration: Declaration, scale_known: bool) -> d
     sealed = [one for one in read_sealed(folder.sealed) if one.trial in nulls]
     present = [one for one in sealed if folder.measured(one.trial).is_file()]
     if not present:
-        raise InputError("needs heaps of trials that hide nothing", "none", str(folder.root))
+        raise InputError(str(folder.root), "needs heaps of trials that hide nothing", "none")
     measured, _ = read_data(folder, present, load_study(STUDY, declaration.scale or None))
     known = stated_scales(VIEWS[declaration.plan.view]) if scale_known else {}
     return {trial: replace(one, calibration=known) for trial, one in measured.items()}

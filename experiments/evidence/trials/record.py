@@ -50,7 +50,7 @@ def gather(folder: Folder, record: Path, heaps: bool = False) -> None:
     files += [reality] if reality.is_file() else []
     for source in (*files, folder.hidden_labels):
         if not source.is_file():
-            raise InputError("trials that are revealed have run", "no such file", str(source))
+            raise InputError(str(source), "expected trials that are revealed have run", "no such file")
     analysed = opened(read_sealed(folder.sealed), read_findings([folder.findings])["trial"])
     labels = revealed(read_labels(folder.hidden_labels), analysed)
     for source in files:

@@ -119,7 +119,7 @@ def main(
     """Analyse the trials that have not been."""
     with clear_errors("Resume with the same command."):
         if view not in (None, *VIEWS):
-            raise InputError(f"must be one of {', '.join(VIEWS)}", view, "--view")
+            raise InputError("--view", f"must be one of {', '.join(VIEWS)}", view)
         place = Folder(folder)
         views = (read_declaration(place.declared).plan.view, PHOTOGRAPHS) if view is None else (view,)
         if plan_only:

@@ -104,7 +104,7 @@ def read_sealed(path: Path) -> tuple[Sealed, ...]:
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.DictReader(file)
         if tuple(reader.fieldnames or ()) != _COLUMNS:
-            raise InputError(f"needs the columns {', '.join(_COLUMNS)}", reader.fieldnames, str(path))
+            raise InputError(str(path), f"needs the columns {', '.join(_COLUMNS)}", reader.fieldnames)
         return tuple(
             Sealed(row["trial"], row["part"], tuple(row["withheld"].split()), row["sha256"]) for row in reader
         )
@@ -137,9 +137,9 @@ def revealed(labels: Sequence[Label], sealed: Sequence[Sealed]) -> dict[str, Lab
     by_trial = {label.trial: label for label in labels}
     for trial in sealed:
         if trial.trial not in by_trial:
-            raise InputError("every sealed trial has a label", "none", trial.trial)
+            raise InputError(trial.trial, "expected every sealed trial has a label", "none")
         if (found := by_trial[trial.trial].hash) != trial.hash:
-            raise InputError(f"a label must have the hash {trial.hash} that sealed it", found, trial.trial)
+            raise InputError(trial.trial, f"a label must have the hash {trial.hash} that sealed it", found)
     return {trial.trial: by_trial[trial.trial] for trial in sealed}
 
 

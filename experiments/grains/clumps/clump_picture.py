@@ -31,7 +31,7 @@ def require_picture(path: Path) -> None:
 
     known = Figure().canvas.get_supported_filetypes()
     if path.suffix.removeprefix(".").lower() not in known:
-        raise InputError(f"must be a kind of picture ({', '.join(known)})", path.suffix or "none", str(path))
+        raise InputError(str(path), f"must be a kind of picture ({', '.join(known)})", path.suffix or "none")
     require_new_file(path, "a picture")
 
 

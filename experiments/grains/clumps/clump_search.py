@@ -130,4 +130,4 @@ def fit_within(
         f"{tolerance:.1%}; the best, {best.spheres} spheres: volume {best.volume_error:+.1%}, "
         f"inertia {best.inertia_error:.1%}, surface {best.surface_error:.1%}"
     )
-    raise InputError(rule, received, "--tolerance")
+    raise InputError("--tolerance", rule, received)

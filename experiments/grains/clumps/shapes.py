@@ -117,12 +117,14 @@ def make_clump(request: ClumpRequest, watch: Callable[[Trial], None] = lambda tr
     wanted = [each for each in (request.sphere_count, request.tolerance) if each is not None]
     given = not named and _holds_spheres(Path(source), bool(wanted))
     if given and wanted:
-        raise InputError("spheres that are given are not fitted", wanted[0], "--spheres, --tolerance")
+        raise InputError(
+            "--spheres, --tolerance", "expected spheres that are given are not fitted", wanted[0]
+        )
     if not given and len(wanted) != 1:
-        rule = "a solid is filled with a number of spheres, or within a tolerance"
-        raise InputError(rule, "both" if wanted else "none", "--spheres, --tolerance")
+        rule = "expected a solid is filled with a number of spheres, or within a tolerance"
+        raise InputError("--spheres, --tolerance", rule, "both" if wanted else "none")
     if named and unit is not None:
-        raise InputError("the dimensions of a solid are in mm", unit, "--unit")
+        raise InputError("--unit", "expected the dimensions of a solid are in mm", unit)
     if unit is not None:
         _check_unit(unit)
     if given:
@@ -134,7 +136,7 @@ def make_clump(request: ClumpRequest, watch: Callable[[Trial], None] = lambda tr
     except InputError:
         raise
     except (ValueError, OSError) as error:
-        raise InputError(str(error), source, "SHAPE") from None
+        raise InputError("SHAPE", str(error), source) from None
     return Clump(fit.shape, fit, solid=solid, trials=tuple(trials))
 
 
@@ -162,7 +164,7 @@ def _check_unit(unit: str) -> None:
     try:
         length_unit(unit)
     except ValueError as error:
-        raise InputError(str(error), unit, "--unit") from None
+        raise InputError("--unit", str(error), unit) from None
 
 
 def _mesh(path: Path, unit: str | None) -> Trimesh:
@@ -175,9 +177,11 @@ def _mesh(path: Path, unit: str | None) -> Trimesh:
         # the reader's own words, without the class of its error
         cause = error.__cause__
         found = f"a file without {cause}" if isinstance(cause, KeyError) else str(cause) or "another file"
-        raise InputError("must be a mesh that can be read", found, str(path)) from error
+        raise InputError(str(path), "must be a mesh that can be read", found) from error
     if mesh.body_count > 1:
-        raise InputError("a grain is one closed body", f"{mesh.body_count} bodies in the mesh", str(path))
+        raise InputError(
+            str(path), "expected a grain is one closed body", f"{mesh.body_count} bodies in the mesh"
+        )
     if unit is None:
         check_grain_size(float(mesh.extents.max()), str(path), "read in mm")
     return mesh

@@ -58,13 +58,13 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
         on_each, total = values, sum(values)
         if column == "retained_percent" and abs(total - 100.0) > ROUNDING:
             rule = f"must add up to 100 within {ROUNDING:g}"
-            raise InputError(rule, f"{total:g}", f"{path}: retained_percent")
+            raise InputError(f"{path}: retained_percent", rule, f"{total:g}")
     # what lies on a sieve is larger than its opening, and smaller than the next
     sieves = zip(openings, openings[1:], on_each, strict=False)
     between = [(low, high, on) for low, high, on in sieves if low > 0.0]
     kept = sum(on for *_, on in between)
     if not kept > 0.0:
-        raise InputError("must hold mass between two sieves", f"{kept:g}", f"{path}: {column}")
+        raise InputError(f"{path}: {column}", "must hold mass between two sieves", f"{kept:g}")
     return _tabulated(between, kept), 1.0 - kept / total
 
 
@@ -74,7 +74,7 @@ def _refuse_mesh_numbers(path: Path) -> None:
     if found := _MESH_NUMBER.search(text):
         rule = "needs a unit of length, as 0.425 mm: the number of a mesh has none"
         line = text.count("\n", 0, found.start()) + 1
-        raise InputError(rule, found[1], f"{path}:{line}: opening")
+        raise InputError(f"{path}:{line}: opening", rule, found[1])
 
 
 def read_counts(path: Path, unit: str | None = None) -> Tabulated:
@@ -93,20 +93,20 @@ def read_counts(path: Path, unit: str | None = None) -> Tabulated:
     if "diameter" in rows[0].cells:
         if both := [name for name in ("from", "to") if name in rows[0].cells]:
             rule = "takes a column diameter, or from, to and count, not both"
-            raise InputError(rule, f"diameter and {', '.join(both)}", str(path))
+            raise InputError(str(path), rule, f"diameter and {', '.join(both)}")
         found = [(_length(row, "diameter", unit), _count(row)) for row in rows]
         between = [(diameter, diameter, share) for diameter, share in sorted(found)]
     else:
         if missing := [name for name in ("from", "to", "count") if name not in rows[0].cells]:
             rule = f"needs a column diameter, or from, to and count; missing: {', '.join(missing)}"
-            raise InputError(rule, ", ".join(rows[0].cells), str(path))
+            raise InputError(str(path), rule, ", ".join(rows[0].cells))
         between = [_class(row, unit) for row in rows]
         for row, (before, after) in zip(rows[1:], pairwise(between), strict=True):
             if after[0] < before[1]:
                 raise row.error("classes rise from row to row, and do not overlap", "from")
     total = sum(share for *_, share in between)
     if not total > 0.0:
-        raise InputError("must count at least one grain", f"{total:g}", f"{path}: count")
+        raise InputError(f"{path}: count", "must count at least one grain", f"{total:g}")
     return _tabulated([each for each in between if each[2] > 0.0], total)
 
 
@@ -176,11 +176,11 @@ def _one_of(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> str:
     found = [name for name in columns if rows and name in rows[0].cells]
     if len(found) != 1:
         rule = f"needs one column of {', '.join(columns)}"
-        raise InputError(rule, ", ".join(found) or "none", str(path))
+        raise InputError(str(path), rule, ", ".join(found) or "none")
     return found[0]
 
 
 def _at_least(path: Path, rows: Sequence[Row], least: int) -> None:
     if len(rows) < least:
         rule = f"needs {least} rows or more below the names of the columns"
-        raise InputError(rule, str(len(rows)), str(path))
+        raise InputError(str(path), rule, str(len(rows)))

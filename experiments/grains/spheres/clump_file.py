@@ -77,10 +77,12 @@ def read_clump(path: Path, unit: str | None = None) -> ClumpFile:
     size, said = _unit(file.unit, unit, place)
     if file.bodies is not None and file.body_count > 1:
         numbers = ", ".join(str(body) for body in np.unique(file.bodies)[:5])
-        rule = "a clump's file holds one body: keep the lines of one"
-        raise InputError(rule, f"{file.body_count} bodies ({numbers}, ...)", place)
+        rule = "expected a clump's file holds one body: keep the lines of one"
+        raise InputError(place, rule, f"{file.body_count} bodies ({numbers}, ...)")
     if len(file.spheres) > MOST_SPHERES:
-        raise InputError(f"a clump has at most {MOST_SPHERES} spheres", f"{len(file.spheres)}", place)
+        raise InputError(
+            place, f"expected a clump has at most {MOST_SPHERES} spheres", f"{len(file.spheres)}"
+        )
     spheres = file.spheres * size
     check_computable(spheres, place)
     check_one_body(spheres, place)
@@ -98,7 +100,9 @@ def _unit(named: float | None, given: str | None, place: str) -> tuple[float, st
         return named, f"{_named(named)}, as the file says"
     size = length_unit(given)
     if named is not None and size != named:
-        raise InputError("the unit given is that which the file names", f"{given} for {_named(named)}", place)
+        raise InputError(
+            place, "expected the unit given is that which the file names", f"{given} for {_named(named)}"
+        )
     return size, given
 
 
@@ -116,9 +120,9 @@ def check_computable(spheres: np.ndarray, place: str) -> None:
     """
     largest, smallest = COMPUTABLE
     if np.abs(spheres).max() > largest or spheres[:, 3].min() < smallest:
-        rule = f"a sphere lies within {largest:g} m, and its radius is at least {smallest:g} m"
+        rule = f"expected a sphere lies within {largest:g} m, and its radius is at least {smallest:g} m"
         found = f"{np.abs(spheres).max():.4g} m and {spheres[:, 3].min():.4g} m"
-        raise InputError(rule, found, place)
+        raise InputError(place, rule, found)
 
 
 def check_grain_size(length: float, place: str, read_as: str) -> None:
@@ -132,8 +136,8 @@ def check_grain_size(length: float, place: str, read_as: str) -> None:
     low, high = GRAIN_SIZES
     if not low <= length <= high:
         sizes = f"{1e3 * low:g} to {1e3 * high:g} mm"
-        rule = f"a grain is {sizes} long, unless its unit is named (--unit, clump_unit)"
-        raise InputError(rule, f"{1e3 * length:.4g} mm, {read_as}", place)
+        rule = f"expected a grain is {sizes} long, unless its unit is named (--unit, clump_unit)"
+        raise InputError(place, rule, f"{1e3 * length:.4g} mm, {read_as}")
 
 
 def check_one_body(spheres: np.ndarray, place: str) -> None:
@@ -148,7 +152,7 @@ def check_one_body(spheres: np.ndarray, place: str) -> None:
     apart = np.linalg.norm(centers[:, None] - centers[None], axis=2)
     reach = radii[:, None] + radii[None] + GAP * np.minimum(radii[:, None], radii[None])
     if (parts := _parts(apart <= reach)) > 1:
-        raise InputError("the spheres of a clump touch one another", f"{parts} parts apart", place)
+        raise InputError(place, "expected the spheres of a clump touch one another", f"{parts} parts apart")
 
 
 def _parts(touching: np.ndarray) -> int:

@@ -81,8 +81,8 @@ def _read(path: Path) -> SphereFile:
         if frame.is_whole and frame.columns:
             chosen, position = frame, count
     if chosen is None or last is None:
-        rule = "a dump has a frame with ITEM: ATOMS and as many lines as its NUMBER OF ATOMS"
-        raise InputError(rule, "none that is whole", str(path))
+        rule = "expected a dump has a frame with ITEM: ATOMS and as many lines as its NUMBER OF ATOMS"
+        raise InputError(str(path), rule, "none that is whole")
     place = f"{path}, line {chosen.first_row - 1}"
     lengths, scaled = _columns(chosen.columns, place)
     rows = ((chosen.first_row + n, row.split()) for n, row in enumerate(chosen.items["ATOMS"]))
@@ -104,8 +104,8 @@ def _columns(names: list[str], place: str) -> tuple[Columns, bool]:
     start = next((name for name in PLACES if all(axis + name[1:] in names for axis in "xyz")), None)
     size = next((name for name in ("radius", "diameter") if name in names), None)
     if start is None or size is None:
-        rule = "a dump of spheres has the columns x y z (or xu, xs) and radius (or diameter)"
-        raise InputError(rule, " ".join(names) or "no columns", place)
+        rule = "expected a dump of spheres has the columns x y z (or xu, xs) and radius (or diameter)"
+        raise InputError(place, rule, " ".join(names) or "no columns")
     x, y, z = (names.index(axis + start[1:]) for axis in "xyz")
     body = next((names.index(name) for name in BODIES if name in names), None)
     return Columns(x, y, z, names.index(size), size == "diameter", body), start in ("xs", "xsu")
@@ -116,13 +116,13 @@ def _box(frame: _Frame, place: str) -> tuple[np.ndarray, np.ndarray]:
     rows = [row.split() for row in frame.items.get("BOX BOUNDS", [])]
     kinds = frame.items.get("BOX BOUNDS columns", [])
     if "xy" in kinds or "abc" in kinds:
-        rule = "places in parts of a tilted box are not read: dump x y z"
-        raise InputError(rule, f"BOX BOUNDS {' '.join(kinds)}", place)
+        rule = "expected places in parts of a tilted box are not read: dump x y z"
+        raise InputError(place, rule, f"BOX BOUNDS {' '.join(kinds)}")
     try:
         low, high = np.array(rows, dtype=np.float64)[:3, :2].T
     except ValueError:
-        rule = "BOX BOUNDS has a lowest and a highest number for x, y and z"
-        raise InputError(rule, str(rows), place) from None
+        rule = "expected BOX BOUNDS has a lowest and a highest number for x, y and z"
+        raise InputError(place, rule, str(rows)) from None
     return low, high
 
 

@@ -40,7 +40,7 @@ def _read(path: Path) -> SphereFile:
     rows = [(number, split(line, delimiter)) for number, line in lines]
     for number, cells in rows:
         if len(cells) != 4:
-            raise InputError(SPHERE_RULE, " ".join(cells), f"{path}, line {number}")
+            raise InputError(f"{path}, line {number}", SPHERE_RULE, " ".join(cells))
     spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3), path, delimiter)
     told = "spheres (x y z r, as in multisphere templates of LIGGGHTS)"
     return SphereFile(told, spheres, unit=_named_unit(text))

@@ -27,7 +27,7 @@ def format_of(path: Path) -> Format | None:
         with path.open("rb") as file:
             data = file.read(HEAD)
     except OSError as error:
-        raise InputError("must be a readable file", error.strerror or str(error), str(path)) from None
+        raise InputError(str(path), "must be a readable file", error.strerror or str(error)) from None
     head = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     binary_vtk = head.startswith("# vtk DataFile") or "<VTKFile" in head[:4096]
     if "\0" in head and not binary_vtk:
@@ -51,4 +51,4 @@ def read_spheres(path: Path) -> SphereFile:
     with path.open("rb") as file:
         decoded(file.read(HEAD), str(path))
     known = "; ".join(each.name for each in FORMATS)
-    raise InputError(f"needs a file of spheres ({known})", "none of these", str(path))
+    raise InputError(str(path), f"needs a file of spheres ({known})", "none of these")

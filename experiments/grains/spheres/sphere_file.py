@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from experiments.io.errors import InputError
 from experiments.io.texts import is_number, number
 
-SPHERE_RULE = "a sphere is x y z r: four finite numbers, r > 0"
+SPHERE_RULE = "expected a sphere is x y z r: four finite numbers, r > 0"
 
 LARGEST = 500_000_000
 """Bytes of the largest file of spheres that is read: frames of a heap of millions."""
@@ -92,13 +92,13 @@ def spheres_of(
     values = []
     for line, cells in rows:
         if len(cells) <= max(needed) or not all(is_number(cells[column], delimiter) for column in needed):
-            raise InputError(SPHERE_RULE, " ".join(cells), f"{path}, line {line}")
+            raise InputError(f"{path}, line {line}", SPHERE_RULE, " ".join(cells))
         row = [number(cells[column]) for column in needed]
         if not np.isfinite(row).all() or row[3] <= 0.0:
-            raise InputError(SPHERE_RULE, " ".join(cells), f"{path}, line {line}")
+            raise InputError(f"{path}, line {line}", SPHERE_RULE, " ".join(cells))
         values.append(row)
     if not values:
-        raise InputError("needs at least one sphere (x y z r)", "none", str(path))
+        raise InputError(str(path), "needs at least one sphere (x y z r)", "none")
     table = np.array(values)
     spheres = table[:, :4] * np.array([1.0, 1.0, 1.0, 0.5 if columns.is_diameter else 1.0])
     return spheres, None if columns.body is None else own_bodies(table[:, 4])

@@ -78,8 +78,8 @@ def _read(path: Path) -> SphereFile:
     if found is None:
         lines = content_lines(text)
         received = lines[0][1] if lines else "an empty file"
-        rule = "a table of spheres has the columns x, y, z and radius (or diameter)"
-        raise InputError(rule, received, f"{path}, line {lines[0][0] if lines else 1}")
+        rule = "expected a table of spheres has the columns x, y, z and radius (or diameter)"
+        raise InputError(f"{path}, line {lines[0][0] if lines else 1}", rule, received)
     header, names, delimiter = found
     kinds = [column_kind(name) for name in names]
     size = "r" if "r" in kinds else "d"
@@ -97,8 +97,8 @@ def _read(path: Path) -> SphereFile:
     if not any(sizes):
         return SphereFile(told, spheres, bodies)
     if not all(sizes):
-        rule = "either all of x, y, z and radius name their unit, or none does"
-        raise InputError(rule, ", ".join(names), f"{path}, line {header}")
+        rule = "expected either all of x, y, z and radius name their unit, or none does"
+        raise InputError(f"{path}, line {header}", rule, ", ".join(names))
     if len(set(sizes)) == 1:
         return SphereFile(told, spheres, bodies, unit=sizes[0])
     return SphereFile(told, spheres * np.array(sizes, dtype=np.float64), bodies, unit=1.0)
@@ -111,7 +111,7 @@ def _unit_of_rows(rows: Iterable[Row], column: int, path: Path) -> float:
         name = cells[column] if len(cells) > column else ""
         if name not in UNITS["length"] or name != (first := first or name):
             rule = f"every row must name the same unit of length ({', '.join(UNITS['length'])})"
-            raise InputError(rule, name, f"{path}, line {line}")
+            raise InputError(f"{path}, line {line}", rule, name)
     return UNITS["length"][first or "m"]
 
 
@@ -122,7 +122,7 @@ def _unit_of(name: str, place: str) -> float | None:
     if not unit:
         return None
     if unit not in UNITS["length"]:
-        raise InputError(f"a unit of length ({', '.join(UNITS['length'])})", name, place)
+        raise InputError(place, f"expected a unit of length ({', '.join(UNITS['length'])})", name)
     return UNITS["length"][unit]
 
 

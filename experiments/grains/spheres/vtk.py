@@ -27,21 +27,21 @@ def _read(path: Path) -> SphereFile:
             points, arrays = np.asarray(grid.points), {n.lower(): n for n in grid.point_data}
             values = {low: np.asarray(grid.point_data[name]) for low, name in arrays.items()}
     except Exception as error:  # VTK's readers raise what they like
-        raise InputError("needs a VTK file that PyVista reads", str(error), str(path)) from None
+        raise InputError(str(path), "needs a VTK file that PyVista reads", str(error)) from None
     if not len(points):
-        raise InputError("needs a VTK file with a point for each sphere", "no points", str(path))
+        raise InputError(str(path), "needs a VTK file with a point for each sphere", "no points")
     size = next((name for name in (*RADII, *DIAMETERS) if name in values), None)
     if size is None:
         named = ", ".join(arrays.values()) or "none"
         raise InputError(
-            "the points have an array radius (or radii, diameter)", f"arrays: {named}", str(path)
+            str(path), "expected the points have an array radius (or radii, diameter)", f"arrays: {named}"
         )
     table = np.column_stack([points, np.ravel(values[size])[: len(points)]]).astype(np.float64)
     rows = ((n, [repr(float(value)) for value in row]) for n, row in enumerate(table))
     try:
         spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3, size in DIAMETERS), path)
     except InputError as error:
-        raise InputError(error.rule, error.value, error.place.replace(", line ", ", point ")) from None
+        raise InputError(error.place.replace(", line ", ", point "), error.problem, error.value) from None
     body = next((name for name in BODIES if name in values), None)
     bodies = None if body is None else own_bodies(values[body].astype(np.float64))
     return SphereFile(f"VTK file, radii from the array {arrays[size]}", spheres, bodies)
@@ -56,7 +56,7 @@ def _ending(path: Path) -> str:
     match = re.search(r'<VTKFile[^>]*\btype="(\w+)"', head)
     kind = match[1] if match else "unknown"
     if kind not in _ENDINGS:
-        raise InputError(f"a VTK file of the type {' or '.join(_ENDINGS)}", kind, str(path))
+        raise InputError(str(path), f"expected a VTK file of the type {' or '.join(_ENDINGS)}", kind)
     return _ENDINGS[kind]
 
 

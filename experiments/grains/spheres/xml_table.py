@@ -27,25 +27,25 @@ def _recognises(head: str) -> bool:
 def _read(path: Path) -> SphereFile:
     text = read_text(path, LARGEST)
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text):
-        raise InputError("XML without a document type and entities", "one with them", str(path))
+        raise InputError(str(path), "expected XML without a document type and entities", "one with them")
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise InputError("needs well-formed XML", str(error), str(path)) from None
+        raise InputError(str(path), "needs well-formed XML", str(error)) from None
     found = list(_spheres(root))
     sizes = {"r" if "r" in entries else "d" for entries in found}
     if len(sizes) > 1:
-        raise InputError("all spheres have a radius, or all a diameter", "some of each", str(path))
+        raise InputError(str(path), "expected all spheres have a radius, or all a diameter", "some of each")
     size = next(iter(sizes), "r")
     rows = ((n, [entries[kind] for kind in (*_NEEDED, size)]) for n, entries in enumerate(found, start=1))
     try:
         spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3, is_diameter=size == "d"), path)
     except InputError as error:
-        raise InputError(error.rule, error.value, error.place.replace(", line ", ", sphere ")) from None
+        raise InputError(error.place.replace(", line ", ", sphere "), error.problem, error.value) from None
     named = {element.get(key) for element in root.iter() for key in ("unit", "units") if element.get(key)}
     lengths = [name for name in named if name in UNITS["length"]]
     if len(lengths) > 1:
-        raise InputError("one unit of length", ", ".join(sorted(lengths)), str(path))
+        raise InputError(str(path), "expected one unit of length", ", ".join(sorted(lengths)))
     return SphereFile(
         "XML with an element for each sphere", spheres, unit=UNITS["length"][lengths[0]] if lengths else None
     )

@@ -38,7 +38,9 @@ def _read_text(path: Path) -> SphereFile:
     text = read_text(path, LARGEST)
     name = text.partition("\n")[0].removeprefix(_HEADER).strip()
     if name not in LAYOUTS:
-        raise InputError(f"a format of Yade with spheres ({', '.join(LAYOUTS)})", name, f"{path}, line 1")
+        raise InputError(
+            f"{path}, line 1", f"expected a format of Yade with spheres ({', '.join(LAYOUTS)})", name
+        )
     rows = ((number, line.split()) for number, line in content_lines(text))
     spheres, bodies = spheres_of(rows, LAYOUTS[name], path)
     return SphereFile(f"Yade's text format {name}", spheres, bodies)
@@ -48,7 +50,7 @@ def _read_template(path: Path) -> SphereFile:
     try:
         tree = ast.parse(read_text(path))
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise InputError("a script of Yade is Python", str(error), str(path)) from None
+        raise InputError(str(path), "expected a script of Yade is Python", str(error)) from None
     calls = [
         node
         for node in ast.walk(tree)
@@ -56,7 +58,7 @@ def _read_template(path: Path) -> SphereFile:
     ]
     if len(calls) != 1:
         raise InputError(
-            "holds one clumpTemplate(relRadii, relPositions)", f"{len(calls)} of them", str(path)
+            str(path), "expected holds one clumpTemplate(relRadii, relPositions)", f"{len(calls)} of them"
         )
     [call] = calls
     place = f"{path}, line {call.lineno}"
@@ -66,11 +68,11 @@ def _read_template(path: Path) -> SphereFile:
         radii = np.array(ast.literal_eval(given["relRadii"]), dtype=np.float64)
         centers = np.array(ast.literal_eval(given["relPositions"]), dtype=np.float64)
     except (KeyError, ValueError, TypeError):
-        rule = "clumpTemplate has relRadii and relPositions, both lists of plain numbers"
-        raise InputError(rule, ast.unparse(call), place) from None
+        rule = "expected clumpTemplate has relRadii and relPositions, both lists of plain numbers"
+        raise InputError(place, rule, ast.unparse(call)) from None
     if radii.ndim != 1 or centers.shape != (len(radii), 3):
-        rule = "clumpTemplate has a radius and a place (x, y, z) for each sphere"
-        raise InputError(rule, f"shapes {radii.shape} and {centers.shape}", place)
+        rule = "expected clumpTemplate has a radius and a place (x, y, z) for each sphere"
+        raise InputError(place, rule, f"shapes {radii.shape} and {centers.shape}")
     rows = ((call.lineno, [repr(float(value)) for value in row]) for row in np.column_stack([centers, radii]))
     spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3), path)
     return SphereFile("clump template of Yade (relative sizes: --unit is the size of 1)", spheres)

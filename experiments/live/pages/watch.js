@@ -145,7 +145,7 @@ function renderStages() {
   byId("stages").replaceChildren(...state.stages.map((stage) => {
     const name = stage.name.replaceAll("_", " ");
     const decisions = stage.decisions.map((each) =>
-      element("li", {}, each.outcome, " ", element("span", { class: "quiet" }, each.rule)));
+      element("li", {}, each.outcome, " ", element("span", { class: "quiet" }, each.problem)));
     const tables = Object.entries(stage.tables).map(([title, found]) => element("details", {},
       element("summary", {}, `Table: ${title.replaceAll("_", " ")}`),
       table(found.columns, found.data, title.replaceAll("_", " "))));

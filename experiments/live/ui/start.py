@@ -123,7 +123,7 @@ def plan(workshop: Workshop, asked: Mapping[str, Any]) -> tuple[tuple[str, ...],
     """
     command, file = asked["command"], asked["file"]
     if command not in COMMANDS:
-        raise InputError(f"must be one of {', '.join(COMMANDS)}", command, "command")
+        raise InputError("command", f"must be one of {', '.join(COMMANDS)}", command)
     scale = asked.get("scale") or None
     study = workshop.study(file, scale)
     out = asked.get("out") or default_folder(study, COMMANDS[command]).as_posix()

@@ -63,7 +63,7 @@ class Runs:
         """
         place = self._place(out)
         if (before := self._started.get(place)) and before.process.poll() is None:
-            raise InputError("one run at a time works in a folder", "another at work", place)
+            raise InputError(place, "expected one run at a time works in a folder", "another at work")
         output = tempfile.TemporaryFile()  # noqa: SIM115  (it lives as long as the run)
         process = subprocess.Popen(
             [*PROGRAM, *words],
@@ -91,7 +91,7 @@ class Runs:
             When there is none.
         """
         if place not in self._started:
-            raise InputError("must be a run that was started from this page", place, "resume")
+            raise InputError("resume", "must be a run that was started from this page", place)
         words = [word for word in self._started[place].words if word != "--resume"]
         return self.start([*words, "--resume"], place)
 
@@ -104,7 +104,7 @@ class Runs:
             When there is none of this name.
         """
         if place not in self.names():
-            raise InputError("must be the folder of a run", place, "run")
+            raise InputError("run", "must be the folder of a run", place)
         return self.folder / place
 
     def names(self) -> list[str]:
@@ -145,7 +145,7 @@ class Runs:
         """Folder of a new run, below that of the page."""
         parts = Path(out).parts
         if not parts or Path(out).is_absolute() or ".." in parts or any(p.startswith(".") for p in parts):
-            raise InputError("must be a folder below the one of this page", out, "--out")
+            raise InputError("--out", "must be a folder below the one of this page", out)
         return Path(out).as_posix()
 
 

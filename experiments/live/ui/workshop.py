@@ -79,12 +79,14 @@ class Workshop:
         """
         parts = name.split("/")
         if not 1 <= len(parts) <= 2 or not all(_FILE_NAME.fullmatch(part) for part in parts):
-            raise InputError("a file has a plain name, of letters, digits, spaces and .-_()", name, "upload")
+            raise InputError(
+                "upload", "expected a file has a plain name, of letters, digits, spaces and .-_()", name
+            )
         path = self.folder.joinpath(*parts)
         if any(each.is_symlink() for each in (path, path.parent)):
-            raise InputError("links are not followed", name, "upload")
+            raise InputError("upload", "expected links are not followed", name)
         if path.exists():
-            raise InputError("an upload never overwrites a file", "one that exists", str(path))
+            raise InputError(str(path), "an upload never overwrites a file", "one that exists")
         return path
 
     def keep(self, name: str, data: bytes) -> Path:
@@ -96,7 +98,7 @@ class Workshop:
             When it is too large, its name is none, or another file has it.
         """
         if len(data) > LARGEST_UPLOAD:
-            raise InputError(f"a file has at most {LARGEST_UPLOAD:,} bytes", f"{len(data):,}", name)
+            raise InputError(name, f"expected a file has at most {LARGEST_UPLOAD:,} bytes", f"{len(data):,}")
         try:
             path = self.new_file(name)
         except InputError:
@@ -171,7 +173,7 @@ class Workshop:
 
     def _plain(self, name: str) -> str:
         if not _FILE_NAME.fullmatch(name) or (self.folder / name).is_symlink():
-            raise InputError("must be a folder of photographs beside the study", name, "pictures")
+            raise InputError("pictures", "must be a folder of photographs beside the study", name)
         return name
 
     # ---- the study file ------------------------------------------------------------------------------------
@@ -240,7 +242,8 @@ class Workshop:
             yield path
         except InputError as error:
             found = [
-                Problem(each.rule, each.value, each.place.replace(str(path), file)) for each in error.problems
+                Problem(each.place.replace(str(path), file), each.problem, each.value)
+                for each in error.problems
             ]
             raise type(error).of(found) from None
         finally:
@@ -249,7 +252,7 @@ class Workshop:
 
 def problems_of(error: InputError) -> dict[str, Any]:
     """Rules that an input breaks, in the command line's own words, and rule, value and place of each."""
-    rows = [{"rule": each.rule, "value": each.value, "place": each.place} for each in error.problems]
+    rows = [{"problem": each.problem, "value": each.value, "place": each.place} for each in error.problems]
     return {"error": str(error), "problems": rows}
 
 
@@ -272,7 +275,7 @@ def _whole(text: str, place: str) -> int:
     try:
         return int(text)
     except ValueError:
-        raise InputError("must be a whole number", text, place) from None
+        raise InputError(place, "must be a whole number", text) from None
 
 
 def _same(folder: Path, name: str, data: bytes) -> bool:

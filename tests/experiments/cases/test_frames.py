@@ -181,8 +181,8 @@ def test_the_clean_picture_measures_to_the_same_angle(
 @pytest.mark.parametrize(
     ("options", "engine", "said"),
     [
-        (("--movie", "avi", "--frames", "4"), "", "--movie: must be one of gif, mp4, none (received avi)"),
-        (("--movie", "gif"), "", "a film is made of frames: --frames N says of how many (received gif)"),
+        (("--movie", "avi", "--frames", "4"), "", "--movie: must be one of gif, mp4, none, got avi"),
+        (("--movie", "gif"), "", "a film is made of frames: --frames N says of how many, got gif"),
         (("--frames", "1"), "", "should be greater than or equal to 2"),
         (
             ("--frames", "4"),

@@ -371,7 +371,7 @@ def test_a_clump_is_made_written_and_described() -> None:
 def test_a_wrong_shape_ends_with_2(arguments: list[str]) -> None:
     code, out, err = dem_warp("clump", *arguments)
     assert (code, out) == (2, "")
-    assert "received" in err
+    assert "got" in err
 
 
 @pytest.mark.parametrize(

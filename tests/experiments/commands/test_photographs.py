@@ -23,7 +23,7 @@ def test_two_forms_of_the_result_at_once_are_refused(tmp_path: Path, forms: tupl
     code, out, err = dem_warp("angle", tmp_path / "heap.png", *forms)
     assert (code, out) == (2, "")
     assert "only one of --target, --csv and --json" in err
-    assert all(form in err.partition("received")[2] for form in forms)
+    assert all(form in err.partition("got")[2] for form in forms)
 
 
 @pytest.mark.parametrize(

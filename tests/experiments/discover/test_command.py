@@ -58,7 +58,7 @@ def test_a_search_on_photographs_needs_what_they_show(tmp_path: Path) -> None:
         code, _, err = discover(data, "--photographs-only", "--out", tmp_path / "out", *more)
         assert code == 2
         assert "measured.csv: a search on photographs only needs what they show: one of flank_angle" in err
-        assert "received t75" in err
+        assert "got t75" in err
 
 
 def test_a_folder_in_use_is_never_written_to(tmp_path: Path) -> None:

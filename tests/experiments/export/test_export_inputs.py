@@ -277,7 +277,7 @@ def test_another_test_and_another_code_are_refused() -> None:
     strange = ExportedTest("strange", replace(drum, scene=object()), "here")
     with pytest.raises(InputError, match="must be a lifted-cylinder"):
         export_input(strange, "liggghts")
-    with pytest.raises(InputError, match=r"must be one of .*liggghts.*received fluent"):
+    with pytest.raises(InputError, match=r"must be one of .*liggghts.*got fluent"):
         export_input(exported("edem"), "fluent")
 
 

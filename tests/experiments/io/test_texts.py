@@ -92,18 +92,18 @@ def test_a_decimal_comma_is_told(text: str) -> None:
 
 
 def test_long_values_and_many_problems_are_cut_short() -> None:
-    error = InputError("must be short", "x" * 10_000_000, "here")
+    error = InputError("here", "must be short", "x" * 10_000_000)
     assert len(str(error)) < 2 * LONGEST_VALUE
     assert "(10000000 characters)" in str(error)
-    many = InputError.of(Problem("must be", str(n), f"line {n}") for n in range(1000))
+    many = InputError.of(Problem(f"line {n}", "must be", str(n)) for n in range(1000))
     assert len(str(many).splitlines()) == MOST_PROBLEMS + 1
     assert len(many.problems) == 1000
 
 
 def test_a_rule_cannot_be_taken_for_a_finding() -> None:
-    told = str(InputError("a grain is one closed body", "2 bodies", "g.stl"))
-    assert told == "g.stl: expected: a grain is one closed body (received 2 bodies)"
-    assert str(InputError("must be one", "2", "x")) == "x: must be one (received 2)"
+    told = str(InputError("g.stl", "expected a grain is one closed body", "2 bodies"))
+    assert told == "g.stl: expected: a grain is one closed body, got 2 bodies"
+    assert str(InputError("x", "must be one", "2")) == "x: must be one, got 2"
 
 
 def test_a_machine_without_a_gpu_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -151,7 +151,7 @@ def test_the_server_listens_on_this_machine_alone() -> None:
     assert place.socket.getsockname()[0] == "127.0.0.1"
     assert len(place.token) >= 32
     assert place.token != Place.open().token
-    with pytest.raises(InputError, match=r"--port: must be a free port of this machine \(.+\) \(received"):
+    with pytest.raises(InputError, match=r"--port: must be a free port of this machine \(.+\), got"):
         Place.open(_taken())
 
 
@@ -224,7 +224,7 @@ def test_live_serves_the_page_beside_the_run(
         urls.append(places[0].url)
         with urllib.request.urlopen(urls[0] + "state.json") as answer:
             seen.append(answer.read())
-        raise InputError("the run has looked", "enough", command)
+        raise InputError(command, "expected the run has looked", "enough")
 
     monkeypatch.setattr(server.Place, "open", lambda port=0: places.append(opened(port)) or places[-1])
     monkeypatch.setattr(server, "can_open_browser", lambda: False)

@@ -88,12 +88,12 @@ def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_pat
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("1,0 mm,0 mm\n1,1 mm,1 mm\n", r"p.csv:2: .*has 8 points or more \(received 2\)"),
+        ("1,0 mm,0 mm\n1,1 mm,1 mm\n", r"p.csv:2: .*has 8 points or more, got 2\)"),
         (
             "".join(f"1,{n} mm,{n} mm\n" for n in range(9)),
-            r"p.csv:2: .*from foot to foot.*received 0 and 8 ",
+            r"p.csv:2: .*from foot to foot.*got 0 and 8 ",
         ),
-        ("", r"p.csv: needs rows below the names of the columns \(received no rows\)"),
+        ("", r"p.csv: needs rows below the names of the columns, got no rows\)"),
         ("1,0 mm,-1 mm\n", r"p.csv:2: z: must stand on the plate"),
         ("1,0 in,1 in\n", r"p.csv:2: x: needs a unit of length"),
         ("1,0,1\n", r"p.csv:2: x: needs a unit of length"),
@@ -137,7 +137,7 @@ def test_a_heap_that_the_test_cannot_give_is_refused_with_file_and_pixel(tmp_pat
         ):
             read_heap_profiles(row, "flank", SIZE)
     points = "".join(f"1,{x} m,{5 - abs(x)} m\n" for x in range(-5, 6))
-    with pytest.raises(InputError, match=r"p.csv:2: z: .*is the unit right\? \(received 5000 mm\)"):
+    with pytest.raises(InputError, match=r"p.csv:2: z: .*is the unit right\?, got 5000 mm\)"):
         read_heap_profiles(file(tmp_path, points), "flank", SIZE)
     spheres = [[x, y, z, 0.5] for z in range(4) for x in range(z - 8, 9 - z) for y in range(z - 8, 9 - z)]
     np.savetxt(tmp_path / "heap.csv", spheres, delimiter=",", header="x,y,z,radius", comments="")
@@ -175,7 +175,7 @@ def test_copies_of_an_outline_are_refused_with_both_places(
         read_heap_profiles(rows, "flank", SIZE)
     points = [f"{x} mm,{9 - abs(x)} mm\n" for x in range(-9, 10)]
     text = "".join(f"1,{point}" for point in points) + "".join(f"2,{point}" for point in points[::-1])
-    with pytest.raises(InputError, match=r"p.csv:21: .*replicate 1 \(.*p.csv:2\) \(received replicate 2\)"):
+    with pytest.raises(InputError, match=r"p.csv:21: .*replicate 1 \(.*p.csv:2\), got replicate 2\)"):
         read_heap_profiles(file(tmp_path, text), "flank", SIZE)
     # In a measured table each replicate may have a file of its own.
     table = tmp_path / "m.csv"

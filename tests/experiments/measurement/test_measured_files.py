@@ -133,7 +133,7 @@ def test_a_picture_of_two_replicates_is_refused_with_both_places(read, tmp_path:
     save_picture(tmp_path / "heap.png", draw(DrawnHeap(27.0, 31.0), PLAIN))
     (tmp_path / "copy.png").write_bytes((tmp_path / "heap.png").read_bytes())
     for name in ("heap.png", "copy.png"):
-        told = rf"csv:3: picture: .*never copies.*heap.png \(.*measured.csv:2: picture\) \(received {name}\)"
+        told = rf"csv:3: picture: .*never copies.*heap.png \(.*measured.csv:2: picture\), got {name}\)"
         with pytest.raises(InputError, match=told):
             read(f"base,1,,,,heap.png,0.1 mm\nbase,2,,,,{name},0.1 mm\n")
     # Another view of the same heap, or a row for each observable, is no repeat.
@@ -172,10 +172,10 @@ def test_what_cannot_be_read_is_refused_with_its_row(read, row: str, message: st
 @pytest.mark.parametrize(
     ("row", "note"),
     [
-        ("height,40,m", "is the unit right? (received 40 m); set aside"),
-        ("height,12,", "in this test: is the unit right (none given: m)? (received 12 m); set aside"),
+        ("height,40,m", "is the unit right?, got 40 m; set aside"),
+        ("height,12,", "in this test: is the unit right (none given: m)?, got 12 m; set aside"),
         ("rolled_fraction,12,", "rolled_fraction lies between 0 and 1 in this test: is the unit right?"),
-        ("t75,400,s", "(received 400 s); set aside"),
+        ("t75,400,s", ", got 400 s); set aside"),
     ],
 )
 def test_a_value_that_the_test_cannot_give_is_set_aside_with_its_row(read, row: str, note: str) -> None:
@@ -203,13 +203,13 @@ def test_a_unit_of_another_kind_is_refused_whatever_the_other_rows_are(read, row
 
 
 def test_one_error_tells_of_all_rows_of_a_wrong_unit(read) -> None:
-    with pytest.raises(InputError, match=r"csv:3: value, rows 3, 4: .*\(received 0.2 in, 0.3 furlong\)"):
+    with pytest.raises(InputError, match=r"csv:3: value, rows 3, 4: .*, got 0.2 in, 0.3 furlong\)"):
         read(angles("base", 25.0) + "base,1,height,0.2,in\nbase,2,height,0.3,furlong\n")
 
 
 def test_one_note_tells_of_all_values_of_one_wrong_unit(read) -> None:
     data = read(angles("base", 25.0) + "".join(f"base,{i},height,1{i},m\n" for i in range(2, 7)))
-    assert noted(data, "rows 3, 4, 5 and 2 more: height lies between", "(received 12 m, ...); set aside")
+    assert noted(data, "rows 3, 4, 5 and 2 more: height lies between", ", got 12 m, ...); set aside")
     # A heap of which nothing is left is none.
     np.testing.assert_array_equal(data.values["base"], [[25.0]])
 
@@ -220,9 +220,7 @@ def test_a_unit_of_the_right_kind_is_converted(read) -> None:
 
 
 def test_wrong_units_that_leave_no_value_are_refused(read) -> None:
-    with pytest.raises(
-        InputError, match=r"2: value, rows 2, 3: .* is the unit right\? \(received 40 m, 41 m\)"
-    ):
+    with pytest.raises(InputError, match=r"2: value, rows 2, 3: .* is the unit right\?, got 40 m, 41 m\)"):
         read("base,1,height,40,m\nbase,2,height,41,m\n")
 
 

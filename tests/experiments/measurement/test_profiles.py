@@ -37,20 +37,20 @@ def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("1,29 mm,29 mm\n", r"p.csv:2: x, z: must lie in the drum, within 30 mm .*received x 29 mm, z 29 mm"),
+        ("1,29 mm,29 mm\n", r"p.csv:2: x, z: must lie in the drum, within 30 mm .*got x 29 mm, z 29 mm"),
         ("1,2,3\n", r"p.csv:2: x: needs a unit of length"),
         ("1,2 in,3 in\n", r"p.csv:2: x: needs a unit of length"),
         (",2 mm,3 mm\n", r"p.csv:2: replicate: needs a label"),
         ("1,2 mm,3 mm\n1,2 mm,4 mm\n", r"p.csv:3: x: .*every place of a profile stands once"),
-        ("1,0 mm,0 mm\n1,5 mm,1 mm\n", r"must span 3 stations of the drum \(received 0 to 5 mm, 1 stations"),
-        ("", r"p.csv: needs rows below the names of the columns \(received no rows\)"),
+        ("1,0 mm,0 mm\n1,5 mm,1 mm\n", r"must span 3 stations of the drum, got 0 to 5 mm, 1 stations"),
+        ("", r"p.csv: needs rows below the names of the columns, got no rows\)"),
         (
             "".join(f"1,{x} mm,0 mm\n" for x in (-20, -14, -8, 0, 6, 12, 18)),
-            r"p.csv:2: x: .*has no gap: points at most 7.5 mm apart .*received none between -8 and 0 mm",
+            r"p.csv:2: x: .*has no gap: points at most 7.5 mm apart .*got none between -8 and 0 mm",
         ),
         (
             LINE + "".join(f"2,{x} mm,{0.5 * x} mm\n" for x in range(-20, 21, 5)),
-            r"p.csv:11: x, z: .*must be high on the left .*received rises by 26.6 deg",
+            r"p.csv:11: x, z: .*must be high on the left .*got rises by 26.6 deg",
         ),
     ],
 )
@@ -71,7 +71,7 @@ def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
     file(tmp_path, LINE)
     study = load_study(write_study((TUBE, DRUM), (ANGLE, TARGET)))
     with pytest.raises(
-        InputError, match=r"p.csv: replicate: needs profiles of 3 repeats or more, .*\(received 1: 1\)"
+        InputError, match=r"p.csv: replicate: needs profiles of 3 repeats or more, .*, got 1: 1\)"
     ):
         with_profiles(study)
     with pytest.raises(StudyError, match=r"names pictures, profiles or a file"):
@@ -96,12 +96,12 @@ def test_a_slope_beside_profiles_of_the_same_test_is_told(
 def test_profiles_of_another_test_or_observable_are_refused(write_study: Callable[..., Path]) -> None:
     heap = load_study(write_study((ANGLE, TARGET)))
     with pytest.raises(
-        InputError, match=r'those of a drum, a "surface", .* \(received surface of lifted-cylinder\)'
+        InputError, match=r'those of a drum, a "surface", .*, got surface of lifted-cylinder\)'
     ):
         with_profiles(heap)
     other = load_study(write_study((TUBE, DRUM), (ANGLE, TARGET.replace('"surface"', '"mass_angle"'))))
     with pytest.raises(
-        InputError, match=r'profiles are of the observable "surface" or "outline" \(received mass_angle\)'
+        InputError, match=r'profiles are of the observable "surface" or "outline", got mass_angle\)'
     ):
         with_profiles(other)
 

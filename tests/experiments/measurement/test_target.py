@@ -91,7 +91,7 @@ def test_a_picture_in_doubt_is_left_out_and_told(from_source, photographs: list[
     assert len(notes) == 1
     assert notes[0].startswith("heap-1.png is doubtful, and left out: ")
     save_picture(photographs[0], draw(DrawnHeap(33.0, 24.0), Camera(noise=0)))
-    with pytest.raises(InputError, match=r"target.pictures: .*without a doubt .*received 1"):
+    with pytest.raises(InputError, match=r"target.pictures: .*without a doubt .*got 1"):
         with_measurements(from_source('pictures = "photos"'))
 
 
@@ -100,7 +100,7 @@ def test_a_copy_of_a_photograph_is_refused_with_both_before_anything_is_measured
 ) -> None:
     photographs[2].write_bytes(photographs[0].read_bytes())
     study = from_source('pictures = "photos"')
-    told = r"target.pictures: .*never copies.*heap-0.png \(.*\(received .*heap-2.png\)"
+    told = r"target.pictures: .*never copies.*heap-0.png \(.*, got .*heap-2.png\)"
     with pytest.raises(InputError, match=told):
         check_runs(study)
     with pytest.raises(InputError, match=told):
@@ -159,10 +159,10 @@ def test_the_observable_that_a_target_asks_its_file_for_leads(
 @pytest.mark.parametrize(
     ("asked", "told"),
     [
-        ('observable = "height"', r"two values .* height shows no scatter.* \(received height \("),
+        ('observable = "height"', r"two values .* height shows no scatter.*, got height \("),
         ('observable = "r90"', r"measured.csv has angle \(base\), t75 \(base\), angle \(fast\) \(rec"),
-        ('observable = "t75"\nscene = "fast"', r"received t75 \(fast\)"),
-        ('observable = "angle"\nscene = "wide"', r"received angle \(wide\)"),
+        ('observable = "t75"\nscene = "fast"', r"got t75 \(fast\)"),
+        ('observable = "angle"\nscene = "wide"', r"got angle \(wide\)"),
     ],
 )
 def test_an_observable_that_the_file_does_not_have_is_refused(
@@ -195,7 +195,7 @@ def test_measurements_that_cannot_be_used_are_refused(
 ) -> None:
     with pytest.raises(InputError) as error:
         check_runs(from_source(source))
-    assert rule in error.value.rule
+    assert rule in error.value.problem
     assert error.value.place.endswith(place)
 
 

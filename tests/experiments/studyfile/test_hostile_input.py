@@ -131,7 +131,7 @@ HOSTILE = {
         "heap s.toml --device cpu --out .", (".", "new or empty", "used"), {"s.toml": SMALL_STUDY}
     ),
     "a file for a folder": Hostile(
-        "heap s.toml --device cpu --out s.toml", ("s.toml", "new or empty", "(received a file)"),
+        "heap s.toml --device cpu --out s.toml", ("s.toml", "new or empty", ", got a file)"),
         {"s.toml": SMALL_STUDY},
     ),
     "a bank of nothing": Hostile(
@@ -185,12 +185,12 @@ HOSTILE = {
     ),
     "half a mesh": clump(
         PLY + "property float y\nproperty float z\nend_header\n0",
-        "g.ply", "must be a mesh that can be read (received PLY is unexpected length!)",
+        "g.ply", "must be a mesh that can be read, got PLY is unexpected length!",
         options="--spheres 3", name="g.ply",
     ),
     "a mesh without heights": clump(
         PLY.replace("binary_little_endian", "ascii") + "end_header\n0\n",
-        "g.ply", "must be a mesh that can be read (received a file without 'y')",
+        "g.ply", "must be a mesh that can be read, got a file without 'y'",
         options="--spheres 3", name="g.ply",
     ),
     "spheres in metres": clump("x,y,z,r\n0,0,0,0.002\n", "g.txt", "--unit", "0.004 mm"),

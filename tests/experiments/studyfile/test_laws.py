@@ -94,7 +94,7 @@ def test_wrong_laws_are_refused_with_rule_value_and_place(
     path = write_study(add=text)
     with pytest.raises(StudyError) as caught:
         load_study(path)
-    assert rule in caught.value.rule
+    assert rule in caught.value.problem
     assert caught.value.place.startswith(f"{path}:")
     assert caught.value.place.endswith(place)
 
@@ -151,8 +151,8 @@ def test_a_card_of_other_laws_is_taken_by_a_study_that_says_so_alone(write_study
     for solver in ('laws = "liggghts"', 'laws = "liggghts"\ncard_laws = "edem"'):
         with pytest.raises(StudyError) as caught:
             load_study(study(solver))
-        assert "hold for the laws 'relative'" in caught.value.rule
-        assert 'card_laws = "relative"' in caught.value.rule
+        assert "hold for the laws 'relative'" in caught.value.problem
+        assert 'card_laws = "relative"' in caught.value.problem
         assert caught.value.value == "liggghts"
     assert load_study(study('laws = "relative"')).solver.laws == RELATIVE
     told = load_study(study('laws = "liggghts"\ncard_laws = "relative"'))
@@ -185,7 +185,7 @@ def corrected(write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch) -> Write
 
 
 @pytest.mark.parametrize(
-    ("add", "option", "received"),
+    ("add", "option", "got"),
     [
         ("", None, "dem-warp"),
         ("", "third", "third"),
@@ -195,14 +195,14 @@ def corrected(write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch) -> Write
     ],
 )
 def test_a_card_corrected_for_one_solver_is_refused_in_another(
-    corrected: WriteStudy, add: str, option: str | None, received: str
+    corrected: WriteStudy, add: str, option: str | None, got: str
 ) -> None:
     study = with_engine(load_study(corrected(add)), option)
     with pytest.raises(StudyError) as caught:
         engine_of(study)
-    assert "must run in 'other'" in caught.value.rule
-    assert 'card_solver = "other"' in caught.value.rule
-    assert caught.value.value == received
+    assert "must run in 'other'" in caught.value.problem
+    assert 'card_solver = "other"' in caught.value.problem
+    assert caught.value.value == got
     assert caught.value.place == f"{study.file}: solver.card_solver"
 
 

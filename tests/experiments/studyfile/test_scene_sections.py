@@ -64,7 +64,7 @@ high = "20 mm"
     bin_ = OTHER_TESTS[Hopper].replace('outlet = "18 mm"\n', "")
     study = load_study(write_study((TUBE, bin_), ANGLE, add=factor))
     assert study.case({"W": 13.0}, seed=1).scene.outlet == 0.013
-    with pytest.raises(StudyError, match=r"Hopper.outlet: must be below .* \(received \{'W': 41.0\}\)"):
+    with pytest.raises(StudyError, match=r"Hopper.outlet: must be below .*, got \{'W': 41.0\}\)"):
         study.case({"W": 41.0}, seed=1)
     with pytest.raises(StudyError, match=r"small.toml:\d+: scene.hopper.outlet: must be finite"):
         study.case({"W": math.nan}, seed=1)
@@ -99,7 +99,7 @@ def test_a_test_that_cannot_be_is_named_with_its_place(
     with pytest.raises(StudyError) as caught:
         load_study(path)
     problem = caught.value.problems[0]
-    assert rule in problem.rule
+    assert rule in problem.problem
     assert problem.place.startswith(f"{path}")
     assert problem.place.endswith(f": {key}")
 
@@ -136,7 +136,7 @@ def test_an_option_that_cannot_be_is_named_with_its_place(
     with pytest.raises(StudyError) as caught:
         load_study(path)
     problem = caught.value.problems[0]
-    assert rule in problem.rule
+    assert rule in problem.problem
     assert problem.place.endswith(f": scene.lifted-cylinder.{key}")
 
 

@@ -298,7 +298,7 @@ def test_a_breach_is_named_with_its_rule_value_and_line(
     with pytest.raises(StudyError) as caught:
         load_study(path)
     error = caught.value
-    assert rule in error.rule
+    assert rule in error.problem
     place, _, found = error.place.rpartition(": ")
     assert found == key
     line = path.read_text(encoding="utf-8").splitlines()[int(place.rpartition(":")[2]) - 1]

@@ -70,7 +70,7 @@ wall_adhesion_energy_density = 50.0
         ('[mechanism.jkr]\nbetween = "grain"', r"mechanism.jkr.between: must be 'all', 'grains' or 'walls'"),
         (
             "[mechanism.kinetic_friction]\nfriction_drop = 1.5",
-            r"friction_drop: must be less than 1 \(received 1.5\)",
+            r"friction_drop: must be less than 1, got 1.5\)",
         ),
         (
             '[mechanism.jkr]\nwork_of_adhesion = "0.1 J"',

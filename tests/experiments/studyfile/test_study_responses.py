@@ -142,7 +142,7 @@ def test_a_breach_is_named_with_its_rule_and_place(
     assert RESPONSES.count(old) == 1
     with pytest.raises(StudyError) as caught:
         load_study(write_study(add=RESPONSES.replace(old, new)))
-    assert rule in caught.value.rule
+    assert rule in caught.value.problem
     assert caught.value.place.rpartition(": ")[2] == key
 
 

@@ -12,7 +12,7 @@ def corners(factors: Sequence[Factor], runs: int) -> Design:
     """Full factorial of two levels."""
     every = list(product((-1.0, 1.0), repeat=len(factors)))
     if runs % len(every):
-        raise DesignError(f"corners: the runs must be a multiple of {len(every)}, received {runs}")
+        raise DesignError(f"corners: the runs must be a multiple of {len(every)}, got {runs}")
     rows = list(islice((row for _ in range(runs) for row in every), runs))
     labels = pd.RangeIndex(1, runs + 1, name="run")
     return Design(tuple(factors), pd.DataFrame(rows, index=labels, columns=[f.name for f in factors]))

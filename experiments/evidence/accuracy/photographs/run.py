@@ -43,7 +43,7 @@ def measured(picture: Picture) -> tuple[str, ReposeAngle | None, str]:
     try:
         angle = measure(picture)
     except PictureError as error:
-        return "refused", None, f"{error.rule}; received {error.value}"
+        return "refused", None, f"{error.problem}, got {error.value}"
     if angle.doubts:
         return "marked", angle, ", ".join(doubt.name for doubt in angle.doubts)
     return "measured", angle, ""

@@ -40,10 +40,10 @@ class Figure:
 
     def __post_init__(self) -> None:
         if self.promise not in PROMISES:
-            raise ValueError(f"promise is one of {', '.join(PROMISES)}, received {self.promise!r}")
+            raise ValueError(f"promise is one of {', '.join(PROMISES)}, got {self.promise!r}")
         for name in ("stated", "found"):
             if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"{name} lies between 0 and 1, received {getattr(self, name)}")
+                raise ValueError(f"{name} lies between 0 and 1, got {getattr(self, name)}")
 
     @property
     def se(self) -> float:

@@ -100,7 +100,7 @@ def main(
     """Repeat parts of the record and write its page."""
     unknown = [name for name in theme or [] if name not in THEMES]
     if unknown:
-        raise typer.BadParameter(f"a theme is one of {', '.join(THEMES)}, received {unknown[0]!r}")
+        raise typer.BadParameter(f"a theme is one of {', '.join(THEMES)}, got {unknown[0]!r}")
     out.mkdir(parents=True, exist_ok=True)
     for name in theme or THEMES:
         begin = time.perf_counter()

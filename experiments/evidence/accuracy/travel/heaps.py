@@ -188,7 +188,7 @@ def _run_one(folder: Path, programs: Path | None, code: str, card: str, seed: in
     path = os.environ["PATH"] if programs is None else f"{programs.resolve()}{os.pathsep}{os.environ['PATH']}"
     program = translation.command[0]
     if shutil.which(program, path=path) is None:
-        raise InputError("must be installed, its program on the PATH", program, f"--code {code}")
+        raise InputError(f"--code {code}", "must be installed, its program on the PATH", program)
     place = folder / "runs" / f"{code}-{card}-{seed}"
     (place / translation.heap).unlink(missing_ok=True)
     write_export(test, code, translation, place)

@@ -131,7 +131,7 @@ def rows_of(out: Path, seed: int, first: int) -> dict[str, Row]:
     for row in rows:
         if (row["seed"], row["first"]) != (seed, first):
             raise InputError(
-                "one folder holds inputs of one seed from one number on", (seed, first), str(out)
+                str(out), "expected one folder holds inputs of one seed from one number on", (seed, first)
             )
     return {str(row["reader"]): {str(name): value for name, value in row.items()} for row in rows}
 

@@ -40,7 +40,7 @@ def run_study(scale: str, folder: Path, device: str | None = None, workers: int 
     Drums that the folder holds are not simulated again.
     """
     if scale not in RUNS:
-        raise InputError(f"the scale is one of {', '.join(RUNS)}", scale, "--scale")
+        raise InputError("--scale", f"expected the scale is one of {', '.join(RUNS)}", scale)
     study, runs = study_at(scale), RUNS[scale]
     tables: list[pd.DataFrame] = []
 

@@ -42,7 +42,7 @@ def run_study(scale: str, folder: Path, device: str | None = None, workers: int 
     Cases that the folder holds are not simulated again.
     """
     if scale not in RUNS:
-        raise InputError(f"the scale is one of {', '.join(RUNS)}", scale, "--scale")
+        raise InputError("--scale", f"expected the scale is one of {', '.join(RUNS)}", scale)
     runs, machine, store = RUNS[scale], OwnWorkers(device, workers), Store(folder / "cases")
     walls: list[dict[str, Any]] = []
 

@@ -56,10 +56,12 @@ class Benchmark:
     def __post_init__(self) -> None:
         if not len(self.banks) == len(self.rules) == len(self.libraries) or not self.banks:
             counts = (len(self.banks), len(self.rules), len(self.libraries))
-            raise InputError("needs rules and a library for each of at least one bank", counts, "Benchmark")
+            raise InputError("Benchmark", "needs rules and a library for each of at least one bank", counts)
         if any(not 0 <= trial.bank < len(self.banks) for trial in self.trials):
             numbers = sorted({trial.bank for trial in self.trials})
-            raise InputError(f"numbers of banks are 0 to {len(self.banks) - 1}", numbers, "Benchmark.trials")
+            raise InputError(
+                "Benchmark.trials", f"expected numbers of banks are 0 to {len(self.banks) - 1}", numbers
+            )
 
     @cached_property
     def emulators(self) -> tuple[Emulator, ...]:
@@ -70,7 +72,7 @@ class Benchmark:
         """A trial as a method sees it."""
         known = self.emulators[trial.bank].without(*trial.withheld)
         seed = zlib.crc32(trial.name.encode())
-        return Problem(trial.name, known, trial.measured, self.rules[trial.bank], seed)
+        return Problem(trial.measured, trial.name, known, self.rules[trial.bank], seed)
 
 
 def write_benchmark(folder: Path, benchmark: Benchmark, labels: Sequence[Label]) -> None:
@@ -116,11 +118,11 @@ def load_benchmark(folder: Path = FOLDER) -> Benchmark:
     """
     path = folder / TRIALS
     if not path.is_file() or path.stat().st_size > LARGEST:
-        raise InputError(f"must be a file of at most {LARGEST:,} bytes", "none, or a larger one", str(path))
+        raise InputError(str(path), f"must be a file of at most {LARGEST:,} bytes", "none, or a larger one")
     with np.load(path, allow_pickle=False) as file:
         table = {name: file[name] for name in file.files}
     if lacking := {"trial", "bank", "withheld", "conditions", "observables", "values"} - set(table):
-        raise InputError("needs the arrays of a benchmark", f"no {', '.join(sorted(lacking))}", str(path))
+        raise InputError(str(path), "needs the arrays of a benchmark", f"no {', '.join(sorted(lacking))}")
     conditions, observables = (tuple(map(str, table[name])) for name in ("conditions", "observables"))
     trials = []
     for name, bank, withheld, rows in zip(

@@ -41,7 +41,7 @@ def opened_trials(place: Path) -> Iterator[Folder]:
     if not (place / SEALED).is_file():
         if not Folder(place).sealed.is_file():
             raise InputError(
-                "must be a folder of trials, or a record of them", "no sealed trials", str(place)
+                str(place), "must be a folder of trials, or a record of them", "no sealed trials"
             )
         yield Folder(place)
         return
@@ -75,14 +75,14 @@ def measured_problems(place: Path, bank: Path | None = None, count: int | None =
         study = load_study(STUDY, declaration.scale or None)
         sealed = [one for one in read_sealed(folder.sealed) if folder.measured(one.trial).exists()][:count]
         if not sealed:
-            raise InputError("needs measured heaps of sealed trials", "none", str(place))
+            raise InputError(str(place), "needs measured heaps of sealed trials", "none")
         emulator = fit_emulator(Search.of(study).read_bank(bank or bank_beside(declaration.scale)))
         measured, _ = read_data(folder, sealed, study)
         for trial in sealed:
             if trial.trial in measured:
                 job, known = job_name(trial.trial, view), emulator.without(*trial.withheld)
                 heaps = measured[trial.trial].only(VIEWS[view])
-                yield Problem(trial.trial, known, heaps, declaration.settings, zlib.crc32(job.encode()))
+                yield Problem(heaps, trial.trial, known, declaration.settings, zlib.crc32(job.encode()))
 
 
 def open_labels(folder: Folder) -> list[Label]:
@@ -95,7 +95,7 @@ def open_labels(folder: Folder) -> list[Label]:
     """
     for file in (folder.findings, folder.hidden_labels):
         if not file.is_file():
-            raise InputError("needs findings of the search, and the truths", "no such file", str(file))
+            raise InputError(str(file), "needs findings of the search, and the truths", "no such file")
     findings = read_findings([folder.findings])
     analysed = findings.loc[findings["view"] == read_declaration(folder.declared).plan.view, "trial"]
     labels = read_labels(folder.hidden_labels)

@@ -46,9 +46,9 @@ class Answer:
 
     def __post_init__(self) -> None:
         if (self.named or self.unknown) and not self.alarm:
-            raise InputError("names nothing, and says not unknown, without an alarm", self.named, "Answer")
+            raise InputError("Answer", "names nothing, and says not unknown, without an alarm", self.named)
         if self.named and self.unknown:
-            raise InputError("names what is missing, or says that it is unknown", self.named, "Answer")
+            raise InputError("Answer", "names what is missing, or says that it is unknown", self.named)
 
 
 @dataclass(frozen=True, eq=False)

@@ -103,7 +103,7 @@ def gather(out: Path, record: Path, labels: Sequence[Label]) -> None:
     """
     files = sorted((out / FOLDER).glob("*.csv"))
     if not files:
-        raise InputError("needs answers of methods", "none", str(out / FOLDER))
+        raise InputError(str(out / FOLDER), "needs answers of methods", "none")
     for file in files:
         copy_file(file, record / FOLDER / file.name)
     write_labels(record / LABELS, labels)
@@ -141,7 +141,7 @@ def read_record(record: Path, allowed: Sequence[str] | None = None) -> pd.DataFr
         if (path := file_of(record, name)).is_file():
             tables.append(read_answers(path).assign(method=name))
     if not tables:
-        raise InputError("needs answers of methods", "none", str(record / FOLDER))
+        raise InputError(str(record / FOLDER), "needs answers of methods", "none")
     answers = common(pd.concat(tables, ignore_index=True), [table["method"].iloc[0] for table in tables])
     return judged(answers if allowed is None else held(answers, allowed), labels)
 

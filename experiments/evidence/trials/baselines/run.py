@@ -65,7 +65,7 @@ def chosen(names: str, known: Mapping[str, Method]) -> dict[str, Method]:
     wanted = [name.strip() for name in names.split(";") if name.strip()] or list(installed(known))
     for name in wanted:
         if name not in known:
-            raise InputError(f"must be one of {'; '.join(known)}", name, "--methods")
+            raise InputError("--methods", f"must be one of {'; '.join(known)}", name)
     return {name: known[name] for name in wanted}
 
 

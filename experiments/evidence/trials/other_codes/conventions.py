@@ -141,7 +141,7 @@ def main(
     with clear_errors("Resume with the same command."):
         kept = read_record(record)
         if kept.reality is None:
-            raise InputError("must be a record of heaps that another code made", kept.title, str(record))
+            raise InputError(str(record), "must be a record of heaps that another code made", kept.title)
         code, study = kept.reality["code"], load_study(STUDY, kept.declaration.scale or None)
         nulls = [label for label in read_labels(record / LABELS) if label.kind is Kind.NULL]
         measured, _ = measured_offsets(record)

@@ -74,7 +74,7 @@ def plan_for(code: str, plan: Plan) -> Plan:
     """
     known = MADE[code]
     if strange := sorted(set(plan.mechanisms) - set(known)):
-        raise InputError(f"{code} makes {', '.join(known)}", strange, "Plan.mechanisms")
+        raise InputError("Plan.mechanisms", f"expected {code} makes {', '.join(known)}", strange)
     return replace(plan, mechanisms=plan.mechanisms or tuple(known))
 
 
@@ -183,7 +183,7 @@ def measure(
         declaration = read_declaration(place.declared)
         if not place.hidden_labels.is_file():
             rule = "needs the labels of the sealed trials; where they are lost, seal new ones"
-            raise InputError(rule, "no such file", str(place.hidden_labels))
+            raise InputError(str(place.hidden_labels), rule, "no such file")
         labels = list(revealed(read_labels(place.hidden_labels), read_sealed(place.sealed)).values())
         with open_workers(Resources("cpu", workers)) as simulators:
             left = measure_in_time(place, labels, declaration, simulators, deadline)
@@ -201,7 +201,7 @@ def resume(
     with clear_errors():
         place = Folder(folder)
         if place.sealed.exists():
-            raise InputError("must be a folder without trials", "sealed trials", str(folder))
+            raise InputError(str(folder), "must be a folder without trials", "sealed trials")
         for name in (DECLARATION, SEALED, FINDINGS, RUNS, REALITY):
             copy_file(record / name, place.record / name)
         print(f"{unpack_heaps(record / HEAPS, place)} trials are measured: {place.data}")

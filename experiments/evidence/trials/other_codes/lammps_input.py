@@ -137,7 +137,9 @@ def lammps_files(bench: Bench) -> dict[str, str]:
         When it has liquid bridges, which LAMMPS does not make.
     """
     if bench.bridges() is not None:
-        raise InputError("no liquid bridges, which LAMMPS does not make", CapillaryBridge.name, "the case")
+        raise InputError(
+            "the case", "expected no liquid bridges, which LAMMPS does not make", CapillaryBridge.name
+        )
     end = _END.format(check=bench.check_steps)
     phases = [_setup(bench), _rest(bench, "settle"), _lift(bench), _rest(bench, "rest"), end]
     molecules = {

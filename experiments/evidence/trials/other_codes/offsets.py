@@ -93,7 +93,7 @@ def measured_offsets(record: Path) -> tuple[pd.DataFrame, int]:
     base = Model(fit_emulator(search.read_bank(bank_beside(scale))), (), 0.0)
     nulls = [label for label in read_labels(record / LABELS) if label.kind is Kind.NULL]
     if len(nulls) < 2:
-        raise InputError("needs two revealed trials that hide nothing", len(nulls), str(record / LABELS))
+        raise InputError(str(record / LABELS), "needs two revealed trials that hide nothing", len(nulls))
     with tempfile.TemporaryDirectory() as name:
         folder = Folder(Path(name))
         copy_file(record / SEALED, folder.sealed)

@@ -85,7 +85,7 @@ class OtherCode:
     def _located(self) -> str:
         if path := shutil.which(self.program):
             return path
-        raise InputError(f"{self.name} must be installed, its program on the PATH", self.program, "the code")
+        raise InputError("the code", f"{self.name} must be installed, its program on the PATH", self.program)
 
 
 CODES = {
@@ -107,7 +107,7 @@ def engine_for(code: str, workers: int | None = None) -> ProgramEngine:
         When there is none of the name.
     """
     if code not in CODES:
-        raise InputError(f"must be one of {', '.join(CODES)}", code, "--code")
+        raise InputError("--code", f"must be one of {', '.join(CODES)}", code)
     return ProgramEngine(CODES[code], workers, TIME_LIMIT)
 
 

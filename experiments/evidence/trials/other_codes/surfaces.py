@@ -47,10 +47,14 @@ class Bench:
     def __post_init__(self) -> None:
         if len(self.case.grains.mixture.shapes) != 1:
             shapes = len(self.case.grains.mixture.shapes)
-            raise InputError("grains of the trials in other codes have one shape", shapes, "the case")
+            raise InputError(
+                "the case", "expected grains of the trials in other codes have one shape", shapes
+            )
         strange = [each.name for each in self.case.mechanisms if not isinstance(each, JKR | CapillaryBridge)]
         if strange:
-            raise InputError("another code makes adhesion and bridges among grains", strange, "the case")
+            raise InputError(
+                "the case", "expected another code makes adhesion and bridges among grains", strange
+            )
 
     @cached_property
     def scene(self) -> OddLift:

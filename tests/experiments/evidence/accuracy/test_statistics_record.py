@@ -75,5 +75,5 @@ def test_the_probability_of_a_joint_region_is_the_share_of_its_draws() -> None:
 @pytest.mark.parametrize("arguments", [(1.5, EXACT, 0.5), (0.95, "about", 0.5), (0.95, EXACT, -0.1)])
 def test_a_figure_is_a_share_with_a_promise(arguments: tuple) -> None:
     stated, promise, found = arguments
-    with pytest.raises(ValueError, match="received"):
+    with pytest.raises(ValueError, match="got"):
         Figure("figure", "case", stated, promise, found, 10)

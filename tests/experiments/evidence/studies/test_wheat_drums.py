@@ -145,4 +145,4 @@ def test_an_unknown_scale_is_refused(tmp_path):
 def test_the_page_of_no_run_is_refused(study_app, tmp_path):
     shown = CliRunner().invoke(study_app, ["page", "--out", str(tmp_path)])
     assert shown.exit_code == 2
-    assert "must be the folder of a finished run: run the study first (received without" in shown.stderr
+    assert "must be the folder of a finished run: run the study first, got without" in shown.stderr

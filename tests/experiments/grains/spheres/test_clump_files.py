@@ -186,7 +186,7 @@ def test_a_wrong_file_is_refused_with_its_place(tmp_path: Path, text: str, rule:
     path.write_text(text, "utf-8")
     with pytest.raises(InputError) as caught:
         read_clump(path)
-    assert rule in caught.value.rule
+    assert rule in caught.value.problem
     assert caught.value.place == f"{path}, {place}" if place else caught.value.place == str(path)
 
 

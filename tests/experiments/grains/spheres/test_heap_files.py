@@ -108,7 +108,7 @@ def test_a_flat_heap_is_doubted(tmp_path: Path) -> None:
 
 
 def test_few_grains_are_no_heap() -> None:
-    with pytest.raises(PictureError, match="at least 20 grains; received 1"):
+    with pytest.raises(PictureError, match="at least 20 grains, got 1"):
         heap_angle(np.array([[0.0, 0.0, 1e-3]]), np.array([1e-3]))
 
 

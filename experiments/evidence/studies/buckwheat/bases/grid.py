@@ -85,7 +85,7 @@ def grid() -> Grid:
     for estimator in read.estimator:
         if estimator.name not in FITS:
             raise InputError(
-                f"must be a fit, {nearest_name(estimator.name, list(FITS))}", estimator.name, str(_FILE)
+                str(_FILE), f"must be a fit, {nearest_name(estimator.name, list(FITS))}", estimator.name
             )
     return read
 
@@ -109,5 +109,5 @@ def chosen_bases(names: Iterable[str]) -> list[Base]:
     known, wanted = bases(), list(names)
     for name in wanted:
         if name not in known:
-            raise InputError(f"must name a base, {nearest_name(name, list(known))}", name, "--base")
+            raise InputError("--base", f"must name a base, {nearest_name(name, list(known))}", name)
     return [base for name, base in known.items() if name in wanted or not wanted]

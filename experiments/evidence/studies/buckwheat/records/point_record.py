@@ -58,10 +58,10 @@ class KeptCases:
         missing = wanted.index.difference(self.cases.index)
         if len(missing):
             rule = "kept cases must be those that the study's campaign asks for; gather them anew"
-            raise InputError(rule, dict(zip(KEY, missing[0], strict=True)), self.source)
+            raise InputError(self.source, rule, dict(zip(KEY, missing[0], strict=True)))
         found = self.cases.loc[wanted.index]
         if not np.allclose(found[wanted.columns], wanted, rtol=LAST_DIGITS, atol=0.0):
-            raise InputError("kept cases must have the study's settings", "others", self.source)
+            raise InputError(self.source, "kept cases must have the study's settings", "others")
         # An empty reason is read back as no number.
         found = found.assign(reason=found["reason"].astype(object).fillna(""))
         return found.reset_index()[[*table.columns, *found.columns.drop(wanted.columns)]]

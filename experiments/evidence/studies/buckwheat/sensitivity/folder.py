@@ -24,6 +24,6 @@ def open_settings(folder: Path, settings: dict[str, Any]) -> None:
     path = folder / SETTINGS
     if path.is_file() and (found := json.loads(path.read_text(encoding="utf-8"))) != settings:
         raise StoreError(
-            f"all variants of a folder are simulated as one another: {found}", settings, str(path)
+            str(path), f"expected all variants of a folder are simulated as one another: {found}", settings
         )
     write_text(path, json.dumps(settings, indent=1) + "\n")

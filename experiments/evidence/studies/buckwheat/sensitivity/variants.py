@@ -81,5 +81,5 @@ def chosen_variants(names: Iterable[str]) -> list[Variant]:
     known, wanted = variants(), list(names)
     for name in wanted:
         if name not in known:
-            raise InputError(f"must name a variant, {nearest_name(name, list(known))}", name, "--variant")
+            raise InputError("--variant", f"must name a variant, {nearest_name(name, list(known))}", name)
     return [variant for name, variant in known.items() if name in wanted or not wanted]

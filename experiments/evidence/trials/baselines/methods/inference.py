@@ -92,7 +92,7 @@ def require_sbi() -> None:
         With the command that installs it.
     """
     if not is_installed():
-        raise InputError(f"simulation-based inference needs sbi: {EXTRA}", "not installed: sbi", "--methods")
+        raise InputError("--methods", f"simulation-based inference needs sbi: {EXTRA}", "not installed: sbi")
 
 
 @dataclass(frozen=True, eq=False)
