@@ -1,4 +1,4 @@
-"""In what order modules stand: an import leads down, never back up or around."""
+"""Order of the modules: an import leads down, never back up or around."""
 
 import ast
 from collections.abc import Iterator
@@ -9,18 +9,14 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# Of `experiments`, from the bottom up: a room imports itself and what is named before it. The registry of
-# observables knows no study, so that a study file can name them. Studies, with their companions, stand above
-# the commands, which load a companion by its name. Verification, benchmarks and trials are evidence: nothing
-# imports them.
+# Rooms of `experiments`, whole folders and files at its root, from the bottom up: a room imports itself and
+# rooms before it. Nothing imports the evidence.
 ROOMS = (
-    "version", "errors", "files", "texts", "rows", "toml_files", "studyfile.units", "sphere_files",
-    "grain_sizes", "export", "measurement.observables", "studyfile", "measurement", "cases", "calibrate",
-    "discover", "report", "live.trail", "runs", "bridge", "api", "live", "commands", "live.ui", "cli",
-    "studies", "verification", "benchmarks", "trials",
+    "io", "grains", "export", "studyfile", "measurement", "cases", "calibrate", "bridge", "discover",
+    "report", "journal", "runs", "api", "live", "commands", "cli", "studies", "evidence",
 )  # fmt: skip
 
-# Of `doe.discrepancy`, the folders in the order of use.
+# Folders of `doe.discrepancy` in the order of use.
 STEPS = ("threads", "problem", "emulation", "fitting", "contest", "verdict", "analysis")
 
 
@@ -41,10 +37,9 @@ def imported(path: Path, known: dict[str, Path]) -> Iterator[str]:
             yield from (name if name in known else node.module for name in inner)
 
 
-def room(module: str, package: str, rooms: tuple[str, ...]) -> str:
-    """Room of a module: the longest name of a room that its own begins with."""
-    inside = module.removeprefix(package + ".") + "."
-    return max((name for name in rooms if inside.startswith(name + ".")), key=len, default=inside)
+def room(module: str, package: str) -> str:
+    """Room of a module: the folder or the file directly in the package."""
+    return module.removeprefix(package + ".").partition(".")[0]
 
 
 def circle(graph: dict[str, set[str]]) -> list[str]:
@@ -68,7 +63,7 @@ def test_no_module_imports_itself_around_others(package: str) -> None:
 @pytest.mark.parametrize(("package", "order"), [("experiments", ROOMS), ("doe.discrepancy", STEPS)])
 def test_the_rooms_of_a_package_stand_on_one_another(package: str, order: tuple[str, ...]) -> None:
     known = modules(package.partition(".")[0])
-    rooms = {name: room(name, package, order) for name in known if name.startswith(package + ".")}
+    rooms = {name: room(name, package) for name in known if name.startswith(package + ".")}
     assert set(rooms.values()) == set(order)
     upward = [
         f"{name} -> {other}"

@@ -10,8 +10,8 @@ import pandas as pd
 
 from doe import Comparison, Region, Transfer
 from experiments.bridge.source import Source
-from experiments.calibrate.export import jsonable
 from experiments.calibrate.values import interval_text, listed, quantity
+from experiments.io.plain import jsonable
 
 
 class BridgeOutcome(StrEnum):

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from experiments.commands.console import clear_errors, messages
-from experiments.commands.options import AsJson, quantity, share
+from experiments.commands.options import AsJson
 from experiments.commands.results import print_clump, print_trial
+from experiments.io.units import read_quantity, read_share
 
 if TYPE_CHECKING:
     from experiments.grains.clumps.shapes import Clump
@@ -64,10 +65,10 @@ def clump(
 
         _require_new(out, picture)
         request = ClumpRequest(
-            shape, spheres, share(tolerance, "--tolerance") if tolerance else None,
+            shape, spheres, read_share(tolerance, "--tolerance") if tolerance else None,
             _reach(protrusion, tolerance), unit,
         )  # fmt: skip
-        mass_density = quantity(density, "density", "--density") if density else None
+        mass_density = read_quantity(density, "density", "--density") if density else None
         with messages.status("Fitting spheres"):
             made = make_clump(request, print_trial if tolerance else lambda trial: None)
         if out:
@@ -106,4 +107,4 @@ def _reach(protrusion: str | None, tolerance: str | None) -> float | None:
     """Protrusion [m]; None: the one that keeps the volume."""
     if protrusion is None:
         return None if tolerance else 0.0
-    return None if protrusion == "auto" else quantity(protrusion, "length", "--protrusion")
+    return None if protrusion == "auto" else read_quantity(protrusion, "length", "--protrusion")

@@ -92,28 +92,3 @@ def assignments(texts: list[str]) -> dict[str, str]:
         if not (name.strip() and equals and value.strip()):
             raise InputError("--set", "needs NAME=VALUE, for example E=0.48", text)
     return {name.strip(): value.strip() for name, _, value in pairs}
-
-
-def quantity(text: str, dimension: str, option: str) -> float:
-    """Read an option's quantity in SI."""
-    from experiments.io.errors import InputError
-    from experiments.io.units import Quantity
-
-    try:
-        return Quantity.parse(text).to_base(dimension)
-    except ValueError as error:
-        raise InputError(option, str(error), text) from None
-
-
-def share(text: str, option: str) -> float:
-    """Read a share between 0 and 1, as ``5%`` or ``0.05``."""
-    from experiments.io.errors import InputError
-
-    words = text.strip()
-    try:
-        value = float(words.removesuffix("%")) / (100.0 if words.endswith("%") else 1.0)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < 1.0:
-        raise InputError(option, "must be a share above 0 and below 1, as 5% or 0.05", text)
-    return value

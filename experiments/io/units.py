@@ -9,6 +9,8 @@ import math
 import re
 from dataclasses import dataclass
 
+from experiments.io.errors import InputError
+
 UNITS: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
     "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
@@ -132,3 +134,23 @@ def unit_size(unit: str, dimension: str) -> float:
 def _spelled(value: object) -> str:
     """Return the text of a quantity in plain characters; empty where it cannot be one."""
     return value.strip().translate(_SPELLINGS) if isinstance(value, str) and len(value) <= LONGEST else ""
+
+
+def read_quantity(text: str, dimension: str, place: str) -> float:
+    """Read a quantity of a dimension in SI; an error names its place."""
+    try:
+        return Quantity.parse(text).to_base(dimension)
+    except ValueError as error:
+        raise InputError(place, str(error), text) from None
+
+
+def read_share(text: str, place: str) -> float:
+    """Read a share between 0 and 1, such as ``5%`` or ``0.05``; an error names its place."""
+    words = text.strip()
+    try:
+        value = float(words.removesuffix("%")) / (100.0 if words.endswith("%") else 1.0)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1.0:
+        raise InputError(place, "must be a share above 0 and below 1, such as 5% or 0.05", text)
+    return value

@@ -10,7 +10,7 @@ from typing import Any
 
 import dem_warp
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 """Root of a checkout; of an installation the folder that its packages lie in."""
 
 

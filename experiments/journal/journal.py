@@ -18,10 +18,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from experiments.calibrate.export import indexed, jsonable
 from experiments.calibrate.results import TargetResult
 from experiments.cases.store.folder import JOURNAL
 from experiments.io.errors import StudyError
+from experiments.io.plain import indexed, jsonable
 from experiments.journal.glimpses import Glimpses, prune
 from experiments.journal.progress import time_left
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from plotly.offline import get_plotlyjs
 
-from experiments.calibrate.export import jsonable
 from experiments.io.errors import InputError
+from experiments.io.plain import jsonable
 from experiments.live.charts import charts_of
 from experiments.live.drawing import heap_spheres
 from experiments.live.folder import inside

@@ -11,10 +11,10 @@ from typing import Any
 
 import pandas as pd
 
-from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.cases.store.manifest import study_hash
 from experiments.io.files import write_text
+from experiments.io.plain import jsonable
 from experiments.io.version import program_version
 from experiments.report.campaign_page import render_page
 from experiments.report.companion import Replay

@@ -18,7 +18,6 @@ from dem_warp.version import source_commit
 from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_calibration
-from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import StageResult
 from experiments.cases import Store, Workers, open_folder, run_cases
 from experiments.cases.engines.key import engine_identity
@@ -27,6 +26,7 @@ from experiments.cases.store.outputs import publishing
 from experiments.cases.workers.own import THIS_MACHINE, watched_by
 from experiments.io.errors import StudyError
 from experiments.io.files import write_text
+from experiments.io.plain import jsonable
 from experiments.journal.journal import Journal
 from experiments.measurement.target import with_measurements
 from experiments.report import heap_pictures, verified_heap, write_report

@@ -37,12 +37,12 @@ _ENGINES_LIMIT = re.compile(r"\w+: (must hold at most .+), got ([\d.e+]+|inf): .
 """Words of `PouredScene.supply`: rule and number."""
 
 
-class TooManyGrains(ValueError):  # noqa: N818  (what is wrong, as `StageEnd` is an end)
-    """More grains than a case can have: the rule, and their number."""
+class GrainCountError(ValueError):
+    """More grains than a case can have: the problem, and their number."""
 
-    def __init__(self, rule: str, number: str) -> None:
-        super().__init__(f"{rule}, got {number}")
-        self.rule, self.number = rule, number
+    def __init__(self, problem: str, number: str) -> None:
+        super().__init__(f"{problem}, got {number}")
+        self.problem, self.number = problem, number
 
 
 class ShapeSection(Section):
@@ -251,7 +251,7 @@ class Physics(Section):
         return narrowness(getattr(scene, "diameter", None), grains.shape, size)
 
     def build_case(self, seed: int) -> Case:
-        """Build one case of the engine; a ValueError tells what it cannot be, `TooManyGrains` for one."""
+        """Build one case of the engine; a ValueError tells what it cannot be, `GrainCountError` for one."""
         case = Case(
             scene=self.scene.scene(self.wall.material()),
             grains=self.grain.population(),
@@ -285,9 +285,9 @@ def _check_supply(case: Case) -> None:
     except ValueError as error:
         if (told := _ENGINES_LIMIT.fullmatch(str(error))) is None:
             raise
-        raise TooManyGrains(f"{told[1]}: {advice}", f"{float(told[2]):,.0f}") from None
+        raise GrainCountError(f"{told[1]}: {advice}", f"{float(told[2]):,.0f}") from None
     if grains > MOST_GRAINS:
-        raise TooManyGrains(f"must have at most {MOST_GRAINS:,} grains a case: {advice}", f"{grains:,}")
+        raise GrainCountError(f"must have at most {MOST_GRAINS:,} grains a case: {advice}", f"{grains:,}")
 
 
 def _check_opening(case: Case) -> None:

@@ -38,7 +38,7 @@ from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import RawQuantity, Section, validated
-from experiments.studyfile.sections import Physics, Scene, TooManyGrains
+from experiments.studyfile.sections import Physics, Scene, GrainCountError
 from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
 from imaging import FITS
@@ -261,7 +261,7 @@ class Study(Physics):
             changes["scene"] = self.response_scenes[scene]
         try:
             return changed(self._physics, changes).build_case(seed)
-        except TooManyGrains as error:
+        except GrainCountError as error:
             raise StudyError(self._place_of_grains(scene), error.problem, error.number) from None
         except ValueError as error:
             raise StudyError(str(self.file), str(error), dict(settings)) from error

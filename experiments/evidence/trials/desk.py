@@ -23,13 +23,13 @@ from doe.discrepancy import (
     analyse,
 )
 from doe.errors import RuleError
-from experiments.calibrate.export import jsonable
 from experiments.evidence.trials.findings import VIEWS, Finding, findings_table, read_findings, write_findings
 from experiments.evidence.trials.folder import Folder
 from experiments.evidence.trials.lockstep import Crash
 from experiments.evidence.trials.truth import Sealed
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
+from experiments.io.plain import jsonable
 from experiments.measurement.measured_file import read_measured
 from experiments.studyfile import Study
 

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from dem_warp import SCENES
-from experiments.commands.options import quantity, share
 from experiments.grains.clumps.shapes import ClumpRequest, make_clump, write_clump
 from experiments.io.errors import InputError, Problem
 from experiments.io.files import replacing, write_text
 from experiments.io.toml_files import read_toml, toml_text
+from experiments.io.units import read_quantity, read_share
 from experiments.live.folder import inside
 from experiments.measurement.photographs import mean_angle, measure_pictures
 from experiments.measurement.pictures import find_pictures
@@ -126,11 +126,11 @@ class Workshop:
         request = ClumpRequest(
             source,
             _whole(count, "--spheres") if count else None,
-            share(tolerance, "--tolerance") if tolerance else None,
-            None if reach == "auto" else quantity(reach or "0 mm", "length", "--protrusion"),
+            read_share(tolerance, "--tolerance") if tolerance else None,
+            None if reach == "auto" else read_quantity(reach or "0 mm", "length", "--protrusion"),
             asked.get("unit") or None,
         )
-        density = quantity(asked["density"], "density", "--density") if asked.get("density") else None
+        density = read_quantity(asked["density"], "density", "--density") if asked.get("density") else None
         made = make_clump(request)
         if out := asked.get("out"):
             with TemporaryDirectory() as draft:

@@ -19,7 +19,6 @@ import pandas as pd
 import typer
 
 from doe.discrepancy import Candidate, Discovery, Emulator, Fit, Interval, Settings
-from experiments.calibrate.export import jsonable
 from experiments.evidence.studies.buckwheat.records.paper_record import FOLDER
 from experiments.evidence.studies.buckwheat.records.published_heaps import (
     base_q,
@@ -31,6 +30,7 @@ from experiments.evidence.studies.buckwheat.records.published_heaps import (
 )
 from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
 from experiments.io.files import write_text
+from experiments.io.plain import jsonable
 from experiments.report.kit.markdown import markdown_page, markdown_table
 from experiments.report.kit.numbers import estimate, fixed
 from experiments.report.kit.table import Column, Layout, columns, make_table

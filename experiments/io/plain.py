@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -31,10 +30,9 @@ _PROPERTIES: dict[type, tuple[str, ...]] = {
     Region: ("fraction", "ranges", "extent", "resolution"),
     JointFit: ("point", "alpha", "extent", "shrinkage", "directions"),
 }  # fmt: skip
-"""Properties of each result of `doe` that results.json tells."""
+"""Properties of each result of `doe` that results.json has."""
 
 
-@singledispatch
 def jsonable(value: Any) -> Any:
     """Turn a result into plain JSON data: text, finite numbers, lists, dicts; other numbers are None.
 
@@ -43,77 +41,45 @@ def jsonable(value: Any) -> Any:
     TypeError
         For a kind of value that has no plain form.
     """
+    match value:
+        case Enum():
+            return value.value
+        case None | bool() | int() | str():
+            return value
+        case float():
+            return float(value) if math.isfinite(value) else None
+        case np.generic():
+            return jsonable(value.item())
+        case np.ndarray():
+            return jsonable(value.tolist())
+        case list() | tuple():
+            return [jsonable(item) for item in value]
+        case pd.DataFrame():
+            return [jsonable(row) for row in indexed(value).to_dict("records")]
+        case pd.Series():
+            return jsonable(value.to_dict())
+        case Mapping():
+            return {str(key): jsonable(item) for key, item in value.items()}
+        case BaseModel():
+            return value.model_dump(mode="json")
+    if type(value) in _PROPERTIES:
+        return _properties(value)
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: jsonable(getattr(value, field.name)) for field in fields(value)}
     raise TypeError(f"a {type(value).__name__} has no plain form for results.json")
 
 
-@jsonable.register(type(None))
-@jsonable.register(bool)
-@jsonable.register(int)
-@jsonable.register(str)
-def _plain(value: Any) -> Any:
-    return value
-
-
-@jsonable.register
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-@jsonable.register
-def _scalar(value: np.generic) -> Any:
-    return jsonable(value.item())
-
-
-@jsonable.register
-def _enum(value: Enum) -> Any:
-    return value.value
-
-
-@jsonable.register
-def _array(value: np.ndarray) -> Any:
-    return jsonable(value.tolist())
-
-
-@jsonable.register(list)
-@jsonable.register(tuple)
-def _sequence(value: Any) -> list[Any]:
-    return [jsonable(item) for item in value]
-
-
-@jsonable.register
-def _mapping(value: Mapping) -> dict[str, Any]:
-    return {str(key): jsonable(item) for key, item in value.items()}
-
-
-@jsonable.register
-def _model(value: BaseModel) -> Any:
-    return value.model_dump(mode="json")
-
-
-@jsonable.register
-def _series(value: pd.Series) -> dict[str, Any]:
-    return _mapping(value.to_dict())
-
-
-@jsonable.register
-def _frame(value: pd.DataFrame) -> list[dict[str, Any]]:
-    return [_mapping(row) for row in indexed(value).to_dict("records")]
-
-
-def _result(value: Any) -> dict[str, Any]:
-    """Tell the properties of a result of `doe`."""
-    told = {name: jsonable(getattr(value, name)) for name in _PROPERTIES[type(value)]}
-    if isinstance(value, NoiseFloor):
-        return jsonable(value.sample) | told
-    if isinstance(value, Surface):
-        return told | {"equation": value.equation("natural"), "equation_coded": value.equation("coded")}
-    return told | ({"responses": jsonable(value.tests())} if isinstance(value, JointFit) else {})
-
-
-for _kind in _PROPERTIES:
-    jsonable.register(_kind)(_result)
+def _properties(value: Any) -> dict[str, Any]:
+    """Return the properties of a result of `doe`."""
+    found = {name: jsonable(getattr(value, name)) for name in _PROPERTIES[type(value)]}
+    match value:
+        case NoiseFloor():
+            return jsonable(value.sample) | found
+        case Surface():
+            return found | {"equation": value.equation("natural"), "equation_coded": value.equation("coded")}
+        case JointFit():
+            return found | {"responses": jsonable(value.tests())}
+    return found
 
 
 def indexed(table: pd.DataFrame) -> pd.DataFrame:
