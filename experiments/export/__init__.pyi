@@ -1,11 +1,11 @@
 """The public names: each is loaded with its module when it is first used."""
 
 from .contact import Contact, Term, contacts_of, values
+from .export_folder import export_input, write_export
 from .exporter import ExportedTest, Exporter, Translation
+from .exporters import EXPORTERS
 from .facts import case_terms, term_warnings
-from .folder import export_input, write_export
-from .library import EXPORTERS
-from .translated import Translated
+from .laws import Translated
 
 __all__ = [
     "EXPORTERS",

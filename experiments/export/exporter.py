@@ -1,4 +1,4 @@
-"""Exporters: the same test as the input of another code, and all that was translated on the way."""
+"""Exporters, the tests that they get and the translations that they return."""
 
 from __future__ import annotations
 
@@ -8,17 +8,22 @@ from typing import Any
 
 from dem_warp import Case, Material
 from experiments.export.contact import Contact, Term
-from experiments.export.laws import LawsOfCode
-from experiments.export.translated import Translated
+from experiments.export.laws import LawsOfCode, Translated
 from experiments.io.errors import InputError
 
 
 @dataclass(frozen=True)
 class ExportedTest:
-    """One case that leaves for another code, with what its reader must know of it."""
+    """One case to be exported, with its origin.
+
+    Raises
+    ------
+    InputError
+        When its walls are of several materials.
+    """
 
     name: str
-    """Name of the study or the card, in words."""
+    """Name of the study or the card."""
     case: Case[Any]
     """Scene, grains, contacts, numerics and seed."""
     source: str
@@ -26,38 +31,37 @@ class ExportedTest:
     settings: Mapping[str, str] = field(default_factory=dict)
     """Values of the factors with their units, by name."""
     estimator: str = "repose angle"
-    """Reading of the result, in words."""
+    """Description of how the angle is read."""
 
     def __post_init__(self) -> None:
         if parts := [part.name for part in self.case.wall_parts]:
-            rule = "expected the walls of a test that leaves for another code are all of one material"
-            raise InputError(self.source, rule, f"others for {', '.join(parts)}")
+            rule = f"all walls must be of one material, but {', '.join(parts)} have their own"
+            raise InputError(self.source, rule)
 
 
 @dataclass(frozen=True)
 class Translation:
-    """Input of another code: its files, and what became of each part of the test.
+    """Input of another code: its files, and how each part of the test was translated.
 
     Raises
     ------
     ValueError
-        When the main file is none of the files.
+        When the main file is not one of the files.
     """
 
     files: Mapping[str, str]
     """Text of every file, by its name."""
     main: str
-    """File that a person opens first: a head with the warnings is written above its text."""
+    """File that a person opens first; the warnings are written above its text."""
     command: tuple[str, ...]
-    """Program and arguments that run it in its folder; empty where it cannot be run."""
+    """Command that runs it in its folder; empty when there is none."""
     heap: str
-    """File that the run leaves when it has finished, and only then: a LAMMPS dump of the spheres of the final
-    heap, ``id type x y z radius`` in metres; empty where there is none."""
+    """File that a finished run writes: a LAMMPS dump of the spheres of the final heap, ``id type x y z
+    radius`` in metres; empty when there is none."""
     translated: tuple[Translated, ...]
-    """Everything that was translated, in the order of a reader's interest."""
+    """Rows of the README, the most important first."""
     warnings: tuple[str, ...] = ()
-    """Things that the code lacks, and what stands for them. The command refuses these by name unless it is
-    told that the nearest will do."""
+    """Things that the code lacks, with their replacements; an error without ``--approximate``."""
     comment: str = "#"
     """Beginning of a comment in the main file."""
 
@@ -66,10 +70,10 @@ class Translation:
             raise ValueError(f"Translation.main: must be one of {', '.join(self.files)}, got {self.main!r}")
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the texts as JSON-able data."""
-        told = ("main", "command", "heap", "warnings")
+        """Return everything but the texts as data for JSON."""
+        names = ("main", "command", "heap", "warnings")
         rows = [asdict(row) for row in self.translated]
-        return {name: getattr(self, name) for name in told} | {"files": list(self.files), "translated": rows}
+        return {name: getattr(self, name) for name in names} | {"files": list(self.files), "translated": rows}
 
 
 @dataclass(frozen=True)
@@ -77,19 +81,19 @@ class Exporter:
     """Translation of materials, contacts and tests into the terms of another code."""
 
     code: str
-    """Its name."""
+    """Name of the code."""
     laws: str
-    """Names of its laws that the terms are for."""
+    """Its laws, which the terms belong to."""
     differs: str
     """Differences between those laws and ours."""
     material_terms: Callable[[Material], tuple[Term, ...]]
-    """Terms of one material; empty where all belong to contacts."""
+    """Terms of one material; empty when all belong to contacts."""
     contact_terms: Callable[[Contact], tuple[Term, ...]]
     """Terms of one contact."""
     translate: Callable[[ExportedTest], Translation] | None = None
-    """Input of a test; None where contacts alone can be translated. Raises `InputError` for a test that the
-    code cannot have in any form."""
+    """Input of a test; None when only contacts can be translated. Raises `InputError` for a test that the
+    code cannot have at all."""
     conventions: LawsOfCode | None = None
-    """Conventions that its input has."""
+    """Contact laws that the code has."""
     unproven: str = ""
-    """Words for an input that nobody has run in the code yet, and why; empty where it has been run."""
+    """Warning for an input that nobody has run in the code yet; otherwise empty."""

@@ -8,9 +8,8 @@ from typing import Any
 from dem_warp import Case
 from experiments.export.contact import Term, contacts_of
 from experiments.export.exporter import ExportedTest, Exporter
-from experiments.export.laws import mechanism_warnings
-from experiments.export.library import EXPORTERS
-from experiments.export.translated import Translated
+from experiments.export.exporters import EXPORTERS
+from experiments.export.laws import Translated, mechanism_warnings
 
 
 def laws_row(test: ExportedTest, exporter: Exporter) -> Translated:

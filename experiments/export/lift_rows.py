@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from experiments.export.laws import Translated
 from experiments.export.lift import SIDES, Lift
 from experiments.export.sizes import sizes_text
-from experiments.export.translated import Translated
 
 
 def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:

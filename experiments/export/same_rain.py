@@ -7,7 +7,7 @@ orientations and places, grain by grain, released at the same times.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -17,9 +17,11 @@ import numpy as np
 from dem_warp.model import WorldSetup
 from dem_warp.scenes.lifted_cylinder import CLOGGED, GONE, LiftController
 from dem_warp.scenes.poured_controller import CALM, HEAPED
-from experiments.export.exporter import Translated
+from experiments.export.code_table import CodeTest
+from experiments.export.exporter import Translation
+from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift
-from experiments.export.lift_rows import lift_rows
+from experiments.export.lift_rows import lift_rows, lift_warnings
 from experiments.export.sizes import sizes_text
 
 SCRIPT, RAIN_FILE, TEST_FILE, HEAP = "lift.py", "rain.csv", "test.json", "heap.dump"
@@ -103,22 +105,66 @@ def phases(lift: Lift, world: WorldSetup) -> dict[str, Any]:
     }
 
 
-def program(name: str, solver: str) -> str:
-    """Write a program: its head, the course of the test, and the part of a solver."""
+def same_rain_files(world: WorldSetup) -> dict[str, str]:
+    """Return the files of the rain and the clumps."""
+    return {RAIN_FILE: rain_text(world), **clump_texts(world)}
+
+
+def program_translation(
+    test: CodeTest,
+    world: WorldSetup,
+    solver: str,
+    command: tuple[str, ...],
+    numbers: Mapping[str, Any],
+    rows: Sequence[Translated],
+    walls: Mapping[str, str] | None = None,
+) -> Translation:
+    """Write a Python program: its head, the course of the test and the part of a solver, with its files.
+
+    Parameters
+    ----------
+    test, world
+        The test, and the world of its case.
+    solver
+        Name of the template.
+    command
+        Command that runs the program.
+    numbers
+        Numbers that the program reads besides those of the test.
+    rows
+        Rows of the README.
+    walls
+        Texts of further files by name.
+    """
     reads = f"Reads {TEST_FILE}, {RAIN_FILE} and the clumps; writes {HEAP}."
-    about = f'"""Lifted cylinder in {name}. {reads}"""\n'
-    return about + template("course") + template(solver)
-
-
-def program_files(lift: Lift, world: WorldSetup, text: str, numbers: Mapping[str, Any]) -> dict[str, str]:
-    """Files of a program: its text, the numbers that it reads, the rain and the clumps."""
-    told = test_numbers(lift, world) | dict(numbers)
-    return {
-        SCRIPT: text,
-        TEST_FILE: json.dumps(told, indent=1) + "\n",
-        RAIN_FILE: rain_text(world),
-        **clump_texts(world),
+    about = f'"""Lifted cylinder in {test.exporter.code}. {reads}"""\n'
+    files = {
+        SCRIPT: about + template("course") + template(solver),
+        TEST_FILE: json.dumps(test_numbers(test.lift, world) | dict(numbers), indent=1) + "\n",
+        **same_rain_files(world),
+        **(walls or {}),
     }
+    return same_rain_translation(test, files, SCRIPT, command, rows)
+
+
+def same_rain_translation(
+    test: CodeTest,
+    files: Mapping[str, str],
+    main: str,
+    command: tuple[str, ...],
+    rows: Sequence[Translated],
+    comment: str = "#",
+) -> Translation:
+    """Return the translation of a test whose program places every grain as it is placed here."""
+    return Translation(
+        files=files,
+        main=main,
+        command=command,
+        heap=HEAP,
+        translated=(*same_rain_rows(test.lift), *test.rows, *rows),
+        warnings=test.warnings + lift_warnings(test.lift, ends_in_time=True),
+        comment=comment,
+    )
 
 
 @cache

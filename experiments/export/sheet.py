@@ -1,80 +1,91 @@
-"""Sheets of values for codes that are filled in by hand: names of dialogs, spheres, protocol."""
+"""Sheets of values for codes that a person fills in by hand: names of dialogs, spheres, protocol."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
-from experiments.export.contact import Term
-from experiments.export.exporter import Translation
+from experiments.export.code_table import CodeTest, code_exporter, code_table
+from experiments.export.exporter import Exporter, Translation
+from experiments.export.laws import Translated
 from experiments.export.lift import Lift
 from experiments.export.lift_rows import lift_rows, lift_warnings
-from experiments.export.translated import Translated
 
 SHEET, VALUES, SPHERES = "values.md", "values.csv", "spheres.csv"
 
 
-@dataclass(frozen=True)
-class Entry:
-    """One value to be entered."""
-
-    dialog: str
-    """Dialog or page of the program."""
-    name: str
-    """Name that the value has there."""
-    value: str
-    """Number or choice."""
-    unit: str = ""
+def sheet_exporter(name: str) -> Exporter:
+    """Make the exporter of a code whose dialogs are named in its table."""
+    dialogs = code_table(name)["sheet"]
+    return code_exporter(name, lambda test: _sheet(dialogs, test))
 
 
-def sheet_translation(
-    lift: Lift,
-    code: str,
-    entries: Sequence[Entry],
-    laws: Sequence[Translated],
-    warnings: tuple[str, ...],
-) -> Translation:
-    """Write the sheet of a lifted cylinder as Markdown and as CSV, with a table of the spheres."""
-    rows: list[tuple[str, ...]] = [("dialog", "name", "value", "unit")]
-    rows += [(entry.dialog, entry.name, entry.value, entry.unit) for entry in entries]
+def _sheet(dialogs: Mapping[str, Any], test: CodeTest) -> Translation:
+    """Write the values of a lifted cylinder as Markdown and as CSV, with a table of the spheres."""
+    lift = test.lift
+    rows: list[tuple[str, ...]] = [("dialog", "name", "value", "unit"), *_entries(dialogs, test)]
     spheres = _spheres(lift)
     scale = lift.case.numerics.modulus_scale
     softened = (
         "" if scale == 1.0 else f"The grains' modulus is softened by {scale:g}: calibrated so, keep it.\n\n"
     )
     text = (
-        f"# {lift.test.name}: values for {code}\n\n"
+        f"# {lift.test.name}: values for {test.exporter.code}\n\n"
         f"{softened}## Values\n\n{_markdown(rows)}\n"
         f"## Spheres of a grain of size 1 (`{SPHERES}`)\n\n{_markdown(spheres)}\n"
         f"## Protocol\n\n{_protocol(lift)}"
     )
     files = {SHEET: text, VALUES: _csv(rows), SPHERES: _csv(spheres)}
-    warnings += lift_warnings(lift)
-    return Translation(files, SHEET, (), "", (*laws, *_rows(lift)), warnings, comment=">")
+    warnings = test.warnings + _warnings(dialogs, test) + lift_warnings(lift)
+    return Translation(files, SHEET, (), "", (*test.rows, *_rows(lift)), warnings, comment=">")
 
 
-def term_entries(dialog: str, terms: Iterable[Term]) -> list[Entry]:
-    """Entries of the terms of a material or a contact."""
-    return [
-        Entry(dialog, term.name, f"{term.value:.6g}", "" if term.unit == "1" else term.unit) for term in terms
-    ]
+def _entries(dialogs: Mapping[str, Any], test: CodeTest) -> Iterator[tuple[str, ...]]:
+    """List the values to be entered: dialog, name, value and unit."""
+    exporter, (among, wall, _) = test.exporter, test.contacts
+    terms = [exporter.material_terms(each) for each in (among.first, wall.second)]
+    terms += [exporter.contact_terms(each) for each in (among, wall)]
+    for dialog, some in zip([*dialogs["material"], *dialogs["contact"]], terms, strict=True):
+        for term in some:
+            yield dialog, term.name, f"{term.value:.6g}", "" if term.unit == "1" else term.unit
+    for name, law in dialogs["models"]:
+        yield dialogs["physics"], name, test.words[law], ""
+    if "softening" in dialogs:
+        yield dialogs["physics"], *dialogs["softening"], ""
+    yield *dialogs["spheres"], SPHERES, "mm"
+    for name, value in _sizes(test.lift, dialogs["sizes"]):
+        yield dialogs["size"], name, value, ""
+    yield *dialogs["time_step"], f"{test.lift.case.time_step:.6g}", "s"
 
 
-def size_entries(lift: Lift, dialog: str, names: tuple[str, str, str, str]) -> list[Entry]:
-    """Entries of sizes: mean, standard deviation, smallest and largest of a normal spread; or classes."""
+def _sizes(lift: Lift, names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """List mean, standard deviation, smallest and largest of a normal spread; or classes."""
     grains = lift.case.grains
-    if grains.classes is not None:
+    if grains.classes is None:
+        values = (grains.size_mean, grains.size_sd, *grains.size_range)
+        yield from ((name, f"{value:.6g}") for name, value in zip(names, values, strict=True))
+    else:
         pairs = zip(grains.classes.sizes, grains.classes.fractions, strict=True)
-        return [
-            Entry(dialog, f"user defined {number}: scale, part of the number", f"{size:.6g}, {part:.6g}")
-            for number, (size, part) in enumerate(pairs, 1)
-        ]
-    values = (grains.size_mean, grains.size_sd, *grains.size_range)
-    return [Entry(dialog, name, f"{value:.6g}") for name, value in zip(names, values, strict=True)]
+        for number, (size, part) in enumerate(pairs, 1):
+            yield f"user defined {number}: scale, part of the number", f"{size:.6g}, {part:.6g}"
+
+
+def _warnings(dialogs: Mapping[str, Any], test: CodeTest) -> tuple[str, ...]:
+    """Name the coefficients that the code has fixed, or has once for all contacts."""
+    case, rolling, warnings = test.lift.case, test.words["rolling"], []
+    stiffness = case.laws.rolling_stiffness
+    fixed = dialogs.get("fixed_stiffness", {}).get(rolling, stiffness)
+    if stiffness != fixed:
+        has = f"{test.exporter.code}'s {rolling} has {fixed:g}"
+        warnings.append(f"law rolling_stiffness = {stiffness:g}: {has}, and no entry for it")
+    own, with_wall = case.grain_grain.rolling_friction, case.grain_wall.rolling_friction
+    if "one_number" in dialogs and own != with_wall:
+        warnings.append(f"{dialogs['one_number']}, {own:g}; that of grain with wall is {with_wall:g}")
+    return tuple(warnings)
 
 
 def _rows(lift: Lift) -> list[Translated]:
-    """Rows of the README, with what a person enters in place of what an input holds."""
+    """Return rows of the README, with what a person enters."""
     entered = {
         "sizes": "the same, as entered",
         "mass and inertia": "enter those of the table below, or compare what the program finds",
@@ -131,3 +142,6 @@ def _markdown(rows: Sequence[Sequence[str]]) -> str:
 def _csv(rows: Sequence[Sequence[str]]) -> str:
     quoted = ([f'"{cell}"' if "," in cell else cell for cell in row] for row in rows)
     return "".join(",".join(row) + "\n" for row in quoted)
+
+
+EDEM, ROCKY = sheet_exporter("edem"), sheet_exporter("rocky")

@@ -76,7 +76,8 @@ class Driver:
 def _exporters() -> str:
     """Hash of what the exporters' sources mean."""
     folder, digest = Path(experiments.export.__path__[0]), hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
-        text = source_meaning(path.read_text(encoding="utf-8"))
+    for path in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".toml", ".txt")):
+        text = path.read_text(encoding="utf-8")
+        text = source_meaning(text) if path.suffix == ".py" else text
         digest.update(f"{path.relative_to(folder).as_posix()}\n{text}\n".encode())
     return digest.hexdigest()

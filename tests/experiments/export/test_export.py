@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dem_warp import PRESETS
 from dem_warp.case import Case
-from dem_warp.laws.conventions import NormalDamping
-from experiments.evidence.verification.problems import lammps_contacts
-from experiments.evidence.verification.problems.contact_paths import PATHS, TOLERANCE, PathSetup, difference
 from experiments.export import EXPORTERS, Contact, contacts_of, values
-from experiments.export.lammps import CONVENTIONS, TSUJI, granular_words
+from experiments.export.lammps_exporter import TSUJI, granular_words
 from experiments.studyfile import load_study
 
 RADIUS, MASS = 1.5e-3, 2e-5
+WORDS = EXPORTERS["lammps"].conventions.words(PRESETS["lammps"])
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +60,7 @@ def test_lammps_gets_both_springs_and_both_dampings(contacts: tuple[Contact, Con
         ours = 2.0 * math.sqrt(5.0 / 6.0) * abs(log) / math.hypot(log, math.pi)
         assert np.polyval(TSUJI, terms["e"]) == pytest.approx(math.sqrt(1.5) * ours)
         assert terms["mu_s"] == contact.surface.static_friction
-        words = granular_words(contact).split()
+        words = granular_words(contact, WORDS).split()
         assert [words[0], words[4:6], words[9:11], words[-1]] == [
             "hertz/material", ["tangential", "mindlin"], ["rolling", "sds"], "tsuji",
         ]  # fmt: skip
@@ -110,17 +107,3 @@ def test_what_no_other_code_has_is_refused(case: Case) -> None:
     with_more = load_study(scale="soft", changes=changes).case({}, 1)
     with pytest.raises(ValueError, match=r"terms for the base law alone, got \['micro_slip'\]"):
         contacts_of(with_more, RADIUS, MASS)
-
-
-@pytest.mark.program("lmp")
-@pytest.mark.parametrize(("damping", "rate"), [("mass_velocity", 300.0), ("viscoelastic", 3000.0)])
-def test_a_damping_that_is_lammps_own_goes_the_same_way_there(
-    damping: NormalDamping, rate: float, tmp_path: Path
-) -> None:
-    # a third of the speed is lost; the restitution takes no part
-    laws = replace(PRESETS["lammps"], normal_damping=damping, damping_rate=rate)
-    assert CONVENTIONS.warnings(laws) == ()
-    [path] = [path for path in PATHS if path.name == "pair, rolling"]
-    setup = PathSetup(path, laws)
-    apart = difference(setup, setup.ours("cpu"), lammps_contacts.follow(setup, tmp_path))
-    assert max(apart.values()) < TOLERANCE

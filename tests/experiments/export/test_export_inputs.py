@@ -33,10 +33,8 @@ from dem_warp.laws.conventions import Rolling
 from dem_warp.laws.twisting import Twisting
 from dem_warp.population import SIZE_VARIANCE
 from experiments.cli import app
-from experiments.evidence.verification.problems import lammps_contacts, liggghts_contacts
-from experiments.evidence.verification.problems.contact_paths import PATHS, TOLERANCE, PathSetup, difference
 from experiments.export import EXPORTERS, ExportedTest, case_terms, export_input, term_warnings, write_export
-from experiments.export.lammps_input import grains_at_once
+from experiments.export.lammps_exporter import grains_at_once
 from experiments.export.lift import Lift, disc, prism
 from experiments.export.sizes import size_classes
 from experiments.io.errors import InputError
@@ -252,7 +250,7 @@ def test_the_box_in_the_report_warns_of_the_laws_that_the_input_warns_of(name: s
 
 def test_a_law_that_the_code_lacks_is_refused_or_told_at_the_top(tmp_path: Path) -> None:
     test = exported("edem")
-    with pytest.raises(InputError, match=r"law rolling = 'own_spin': LIGGGHTS has none such; 'cdt' stands"):
+    with pytest.raises(InputError, match=r"law rolling = 'own_spin': LIGGGHTS lacks it; using 'cdt'"):
         export_input(test, "liggghts")
     translation = export_input(test, "liggghts", approximate=True)
     write_export(test, "liggghts", translation, tmp_path)
@@ -367,25 +365,3 @@ def _heap_of(test: ExportedTest, code: str, folder: Path) -> np.ndarray:
     subprocess.run(translation.command, cwd=folder, check=True, capture_output=True)
     rows = (folder / translation.heap).read_text().split("ITEM: ATOMS id type x y z radius")[1].splitlines()
     return np.array([row.split() for row in rows if row.strip()], dtype=float)
-
-
-FOLLOW = {"liggghts": liggghts_contacts.follow, "lmp": lammps_contacts.follow}
-"""Followers of a path by their programs."""
-
-
-@pytest.mark.parametrize(
-    ("name", "laws", "program"),
-    [
-        pytest.param(name, laws, program, marks=pytest.mark.program(program))
-        for name, laws, program in (
-            ("plate, rolling", "liggghts", "liggghts"),
-            ("pair, oblique", "liggghts-cdt", "liggghts"),
-            ("pair, rolling", "lammps", "lmp"),
-        )
-    ],
-)
-def test_a_contact_goes_the_same_way_there(name: str, laws: str, program: str, tmp_path: Path) -> None:
-    [path] = [path for path in PATHS if path.name == name]
-    setup = PathSetup(replace(path, duration=path.duration / 4), PRESETS[laws])
-    apart = difference(setup, setup.ours("cpu"), FOLLOW[program](setup, tmp_path))
-    assert max(apart.values()) < TOLERANCE

@@ -2,8 +2,8 @@
 
 The same clumps in the same poses are bodies of `fix rigid/small`, whose masses and inertias are given. The
 contact law is put together from `pair_style granular`: Hertz, Mindlin's spring with history, Tsuji's damping.
-Its coefficients are those of the case in LAMMPS' terms (`experiments.export.lammps`), so that both springs,
-both dampings and the friction are the same. The resistance to rolling is another one: LAMMPS has `sds` alone,
+Its coefficients are those that the case is exported with, so that both springs, both dampings and the
+friction are the same. The resistance to rolling is another one: LAMMPS has `sds` alone,
 a spring of its own with a slider, whose limit is the case's. The tube is an endless cylinder; LAMMPS takes
 its curvature into the radius of the contacts, half of it being counted.
 """
@@ -25,35 +25,16 @@ from experiments.evidence.performance.peers.peer import (
     spheres_in_place,
 )
 from experiments.export import contacts_of
-from experiments.export.lammps import granular_words
+from experiments.export import lammps_text as text
+from experiments.export.lammps_exporter import granular_words
 
-_INPUT = """\
-units si
-atom_style sphere
-atom_modify map array
-boundary f f f
-newton off
-comm_modify vel yes cutoff {reach}
-fix clump all property/atom mol ghost yes
-read_data column.data fix clump NULL Clumps
-neighbor {skin} bin
-neigh_modify delay 0 every 1 check yes exclude molecule/intra all
-pair_style granular
-pair_coeff * * {among}
-group nothing empty
-# acts on the bodies alone: spheres of a body overlap, and together are heavier than it is
-fix weight nothing gravity {gravity} vector 0 0 -1
-fix bodies all rigid/small molecule infile bodies.txt gravity weight
-fix plate all wall/gran granular {with_wall} zplane 0 NULL
-fix tube all wall/gran granular {with_wall} zcylinder {radius}
-timestep {time_step!r}
+_WALLS = """\
+fix plate all wall/gran granular {words} zplane 0 NULL
+fix tube all wall/gran granular {words} zcylinder {radius}
 compute energy all ke/rigid bodies
 thermo_style custom step c_energy
 thermo {steps}
 run 0
-{start}
-run {run_in}
-{runs}{end}
 """
 
 _DUMP = "write_dump all custom {} id x y z radius modify sort id format float %.12g"
@@ -89,22 +70,21 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
     """Write `column.in`, the spheres to `column.data` and the bodies to `bodies.txt`."""
     setup = moment.setup
     radius = float(setup.shapes[0].radii.max() * setup.grains.sizes.max())
-    among, with_wall = map(granular_words, contacts_of(case, radius, setup.masses[0]))
-    text = _INPUT.format(
-        reach=2.0 * setup.shapes[0].bounding_radius * setup.grains.sizes.max(),
-        skin=plan.skins[0],
-        among=among,
-        with_wall=with_wall,
-        gravity=-setup.gravity[2],
-        radius=case.scene.diameter / 2,
-        time_step=setup.time_step,
-        steps=plan.steps,
-        start=_DUMP.format(START),
-        run_in=plan.run_in,
-        runs=timed_runs(plan),
-        end=_DUMP.format(END),
+    words = {"tangential_history": "mindlin", "attraction": "", "normal_damping": "damping tsuji"}
+    among, with_wall = (
+        granular_words(contact, words) for contact in contacts_of(case, radius, setup.masses[0])
     )
-    (folder / INPUT).write_text(text, encoding="utf-8")
+    reach = 2.0 * setup.shapes[0].bounding_radius * setup.grains.sizes.max()
+    parts = [
+        text.head("array", reach),
+        text.BODY_NUMBERS + "read_data column.data fix clump NULL Clumps\n",
+        text.neighbors(plan.skins[0]),
+        text.contacts({"* *": among}, setup.time_step),
+        text.rigid_bodies(setup.gravity, "infile bodies.txt"),
+        _WALLS.format(words=with_wall, radius=case.scene.diameter / 2, steps=plan.steps),
+        f"{_DUMP.format(START)}\nrun {plan.run_in}\n{timed_runs(plan)}{_DUMP.format(END)}\n",
+    ]
+    (folder / INPUT).write_text("".join(parts), encoding="utf-8")
     (folder / "column.data").write_text(_data(case, moment), encoding="utf-8")
     (folder / "bodies.txt").write_text(_bodies(moment), encoding="utf-8")
 

@@ -17,39 +17,29 @@ from experiments.evidence.performance.columns import Moment
 from experiments.evidence.performance.peers.lammps_files import INPUT, run_input, timed_runs
 from experiments.evidence.performance.peers.peer import MARGIN, PeerRun, Plan, common_size
 from experiments.export import contacts_of, values
-from experiments.export.liggghts import LAWS, contact_terms, material_terms
+from experiments.export import liggghts_text as text
+from experiments.export.liggghts_exporter import LIGGGHTS
+
+LAWS = "hertz tangential history rolling_friction cdt"
+"""Contact model."""
+
+INSERTION_STEP = 1e-12
+"""Time step in which nothing moves [s]."""
 
 SPOT = 1e-9
 """Half the side of the region that a grain is inserted in [m]."""
 
 _SEEDS = (15485863, 15485867, 32452843)  # LIGGGHTS wants primes; nothing is left to chance here
 
-_HEAD = """\
-atom_style granular
-atom_modify map array
-boundary f f f
-newton off
-communicate single vel yes
-units si
-soft_particles yes
-hard_particles yes
-region box block {low} {high} {low} {high} -{margin} {top} units box
-create_box 2 box
-neighbor {skin} bin
-neigh_modify delay 0 every 1 check yes
-{properties}
-pair_style gran model {laws}
-pair_coeff * *
+_WALLS = """\
 fix plate all wall/gran model {laws} primitive type 2 zplane 0.0
 fix tube all wall/gran model {laws} &
     primitive type 2 zcylinder {radius} 0.0 0.0
-fix weight all gravity {gravity} vector 0.0 0.0 -1.0
 fix bodies all multisphere
 fix clump all particletemplate/multisphere {seeds[0]} atom_type 1 density constant {density} &
     nspheres {spheres} ntry 100000 spheres file clump.txt scale {size} type 1 &
     mass {mass} inertia_tensor {inertia[0]} 0 0 {inertia[1]} 0 {inertia[2]} use_density
 fix clumps all particledistribution/discrete {seeds[1]} 1 clump 1.0
-timestep 1e-12
 """
 
 _GRAIN = """\
@@ -99,35 +89,31 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
 
 
 def _head(case: Case[LiftedCylinder], moment: Moment, skin: float) -> str:
-    setup, grain, wall = moment.setup, case.grain_material, case.scene.wall_material
-    shape, reach = setup.shapes[0], case.scene.diameter / 2 + MARGIN
+    setup, shape, reach = moment.setup, moment.setup.shapes[0], case.scene.diameter / 2 + MARGIN
     among, with_wall = (
-        values(contact_terms(contact))
+        values(LIGGGHTS.contact_terms(contact))
         for contact in contacts_of(case, float(shape.radii.max()), float(setup.masses[0]))
     )
-    materials = [values(material_terms(material)) for material in (grain, wall)]
-    by_type = {name: " ".join(repr(terms[name]) for terms in materials) for name in materials[0]}
-    by_pair = {name: f"{value} {' '.join(3 * [str(with_wall[name])])}" for name, value in among.items()}
-    return _HEAD.format(
-        low=-reach,
-        high=reach,
-        margin=MARGIN,
-        top=case.scene.height + MARGIN,
-        skin=skin,
+    materials = [
+        values(LIGGGHTS.material_terms(each)) for each in (case.grain_material, case.scene.wall_material)
+    ]
+    properties = text.properties(materials, lambda i, j: with_wall if i or j else among)
+    sides = (-reach, reach, -reach, reach, -MARGIN, case.scene.height + MARGIN)
+    walls = _WALLS.format(
         laws=LAWS,
-        properties="\n".join(
-            f"fix {name} all property/global {name} {kind} {text}"
-            for kind, terms in (("peratomtype", by_type), ("peratomtypepair 2", by_pair))
-            for name, text in terms.items()
-        ),
         radius=case.scene.diameter / 2,
-        gravity=-setup.gravity[2],
         seeds=_SEEDS,
-        density=grain.density,
+        density=case.grain_material.density,
         spheres=shape.sphere_count,
         size=common_size(moment),
         mass=float(setup.masses[0]),
         inertia=setup.inertias[0].tolist(),
+    )
+    return (
+        text.head(("grains", "walls"), sides, skin)
+        + text.contacts(properties, LAWS, INSERTION_STEP)
+        + text.weight(setup.gravity)
+        + walls
     )
 
 

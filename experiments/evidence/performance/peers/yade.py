@@ -18,7 +18,8 @@ from experiments.evidence.performance.columns import Moment
 from experiments.evidence.performance.peers.peer import MARGIN, PeerRun, Plan, common_size, execute, judged
 from experiments.evidence.performance.timing import Timing
 from experiments.export import contacts_of, values
-from experiments.export.yade import matched_terms, material_terms
+from experiments.export.lift import prism
+from experiments.export.yade_exporter import YADE, contact_numbers
 
 SIDES = 180
 """Sides of the prism; its edges stand out of the tube by 0.015 % of the radius."""
@@ -146,9 +147,9 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
     given = {
         "time_step": setup.time_step,
         "gravity": setup.gravity,
-        "materials": [values(material_terms(one)) for one in (case.grain_material, scene.wall_material)],
-        "contacts": [values(matched_terms(contact)) for contact in contacts],
-        "facets": _prism(scene.diameter / 2, scene.height + MARGIN).tolist(),
+        "materials": [values(YADE.material_terms(one)) for one in (case.grain_material, scene.wall_material)],
+        "contacts": [contact_numbers(contact) for contact in contacts],
+        "facets": prism(scene.diameter / 2, scene.height + MARGIN, SIDES).tolist(),
         "centers": centers.tolist(),
         "radii": radii.tolist(),
         "densities": part_densities(centers, radii, float(setup.masses[0])).tolist(),
@@ -180,14 +181,3 @@ def part_densities(centers: np.ndarray, radii: np.ndarray, mass: float) -> np.nd
     balance = np.vstack([np.ones(len(radii)), centers.T / length])
     wanted = np.array([mass, 0.0, 0.0, 0.0]) - balance @ equal
     return (equal + np.linalg.lstsq(balance, wanted)[0]) / volumes
-
-
-def _prism(radius: float, height: float) -> np.ndarray:
-    """Corners of the triangles of a prism around a tube [m], (2 * SIDES, 3, 3)."""
-    turns = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
-    corner = radius / np.cos(np.pi / SIDES)
-    low = np.column_stack([corner * np.cos(turns), corner * np.sin(turns), np.zeros(SIDES)])
-    high = low + np.array([0.0, 0.0, height])
-    next_low, next_high = np.roll(low, -1, axis=0), np.roll(high, -1, axis=0)
-    halves = [(low, next_low, next_high), (low, next_high, high)]
-    return np.concatenate([np.stack(corners, axis=1) for corners in halves])

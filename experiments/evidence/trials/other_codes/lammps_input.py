@@ -15,10 +15,10 @@ from dem_warp.model import ContactCoefficients
 from dem_warp.scenes.lifted_cylinder import GONE
 from experiments.evidence.trials.other_codes.reading import DRAG, FRAMES
 from experiments.evidence.trials.other_codes.surfaces import BIN, FILL_MARGIN, Bench
-from experiments.export.contact import Contact
-from experiments.export.lammps import CONVENTIONS, granular_words
-from experiments.export.lammps_input import QUIT, molecule_text, written_shares
-from experiments.export.looks import rest_loop
+from experiments.export import Contact
+from experiments.export import lammps_text as text
+from experiments.export.lammps_exporter import LAMMPS, granular_words
+from experiments.export.script_text import clear_loop, rest_loop, watched
 from experiments.io.errors import InputError
 
 INPUT = "lift.in"
@@ -34,24 +34,7 @@ _LIFT_ANYWAY = (
 )
 """End of the wait for rest before the lift."""
 
-_SETUP = """\
-units si
-atom_style sphere
-atom_modify map hash sort 0 0.0  # an array is written beyond its end as grains come in
-boundary f f f
-newton off
-comm_modify vel yes cutoff {cutoff:.6g}
-molecule grains {molecules}
-region box block {low:.6g} {high:.6g} {low:.6g} {high:.6g} {bottom:.6g} {top:.6g}
-create_box {types} box
-neighbor {skin:.6g} bin
-neigh_modify delay 0 every 1 check yes binsize {bin:.6g}
-timestep {time_step:.9g}
-
-# contacts
-pair_style granular
-{pairs}
-
+_WALLS = """
 # walls
 {groups}
 variable rise equal 0.0
@@ -61,12 +44,10 @@ region tube {tube} open 1 open 2 move NULL NULL v_rise rotate v_turn 0 0 0 0 0 1
 region plate plane 0 0 0 0 0 1 move NULL NULL v_shake
 {walls}
 
-# grains: gravity acts on the bodies
-fix clump all property/atom mol ghost yes
-neigh_modify exclude molecule/intra all
-group nothing empty
-fix weight nothing gravity {gravity:.9g} vector {direction}
-fix bodies all rigid/small molecule mol grains gravity weight
+# grains
+"""
+
+_FILLING = """\
 # a body must not leave the box in parts
 region far block -{far:.6g} {far:.6g} -{far:.6g} {far:.6g} INF {far_top:.6g} side out
 fix gone all evaporate {look} 1000000 far {gone_seed} molecule yes
@@ -75,16 +56,7 @@ fix gone all evaporate {look} 1000000 far {gone_seed} molecule yes
 region rain cylinder z 0 0 {rain_radius:.6g} {rain_bottom:.6g} {rain_top:.6g}
 {rain}
 
-variable speed atom sqrt(vx*vx+vy*vy+vz*vz)
-variable square atom vx*vx+vy*vy+vz*vz
-compute fastest all reduce max v_speed
-compute square all reduce ave v_square
-compute highest all reduce max z
-variable moving equal "sqrt(c_square) > {rest:.6g} || c_fastest > {calm:.6g}"
-thermo_style custom step atoms c_fastest c_square c_highest
-thermo {check}
-thermo_modify lost ignore norm no
-
+{watched}
 run {fill_steps}
 {dry}
 variable short equal "atoms < {spheres}"
@@ -108,16 +80,7 @@ dump_modify film sort id format float %.9g
 compute drag all reduce sum {loads}
 variable drag equal {drag_sum}
 fix balance all ave/time 1 {look} {look} v_drag file {drag}
-variable clear equal "v_rise > c_highest + {reach:.6g}"
-variable looks loop {lift_checks}
-label lift
-run {check}
-if "${{clear}} == 1" then "jump SELF lifted"
-next looks
-jump SELF lift
-label lifted
-variable looks delete
-# the plate shakes on, and the film goes to its next look
+{loop}# the plate shakes on, and the film goes to its next look
 variable left equal "(v_begin + {shaken_looks} - step) * (step < v_begin + {shaken_looks})"
 variable go equal ${{left}}
 run ${{go}}
@@ -143,7 +106,7 @@ def lammps_files(bench: Bench) -> dict[str, str]:
     end = _END.format(check=bench.check_steps)
     phases = [_setup(bench), _rest(bench, "settle"), _lift(bench), _rest(bench, "rest"), end]
     molecules = {
-        _file(number): molecule_text(template, ODD if is_odd else GRAIN)
+        text.molecule_file(number): text.molecule_text(template, ODD if is_odd else GRAIN)
         for number, (is_odd, template, _) in enumerate(bench.kinds(), 1)
     }
     return {INPUT: "".join(phases)} | molecules
@@ -173,7 +136,7 @@ def _rain(bench: Bench, lot: _Lot, seed: int) -> str:
     """Write the rain of a lot, of the molecules of its kind alone."""
     kinds = bench.kinds()
     own = np.array([share for is_odd, _, share in kinds if is_odd is lot.is_odd])
-    shares = iter(written_shares(own / own.sum()))
+    shares = iter(text.written_shares(own / own.sum()))
     return _RAIN.format(
         group=lot.group,
         count=lot.count,
@@ -185,51 +148,46 @@ def _rain(bench: Bench, lot: _Lot, seed: int) -> str:
     )
 
 
-def _file(number: int) -> str:
-    return f"grain{number}.mol"
-
-
 def _setup(bench: Bench) -> str:
     scene, lift = bench.scene, bench.lift
     half_width, _, bottom = scene.room(lift.reach)
-    kinds, gravity = bench.kinds(), math.hypot(*scene.gravity)
+    kinds = bench.kinds()
     top = max(bench.rain_top, (1.0 + GONE) * scene.height) + 4.0 * lift.reach
     margin, lots = _MARGIN * lift.reach, _lots(bench)
     gone_seed, *seeds = lift.seeds(1 + len(lots))
     fill = max(lot.count * lot.steps for lot in lots) + lift.steps(FILL_MARGIN)
-    return _SETUP.format(
-        cutoff=2.0 * lift.reach + lift.skin,
-        molecules=" ".join(_file(number) for number, _ in enumerate(kinds, 1)),
-        far=half_width,
-        far_top=top,
-        low=-half_width - margin,
-        high=half_width + margin,
-        look=bench.look_steps,
-        gone_seed=gone_seed,
-        bottom=bottom,
-        top=top + margin,
-        types=ODD if bench.has_odd else GRAIN,
-        skin=lift.skin,
-        bin=BIN * (2.0 * lift.largest_radius + lift.skin),
-        time_step=lift.case.time_step,
-        pairs=_pairs(bench),
-        tube=_tube(bench),
-        groups="\n".join(f"group {lot.group} empty" for lot in lots),
-        walls="\n".join(_walls(bench, lot) for lot in lots),
-        gravity=gravity,
-        direction=" ".join(f"{part / gravity:.9g}" for part in scene.gravity),
-        rain_radius=bench.rain_radius - lift.reach,
-        rain_bottom=lift.rain_bottom,
-        rain_top=bench.rain_top,
-        rain="\n".join(map(partial(_rain, bench), lots, seeds)),
-        dry="\n".join(f"unfix rain_{lot.group}" for lot in lots),
-        rest=scene.rest_speed,
-        calm=lift.calm_speed,
-        check=bench.check_steps,
-        fill_steps=bench.look_steps * math.ceil(fill / bench.look_steps),
-        spheres=lift.count * lift.templates[0].shape.sphere_count,
-        quit=QUIT,
-    )
+    outer = half_width + margin
+    parts = [
+        # an array is written beyond its end as grains come in
+        text.head("hash sort 0 0.0", 2.0 * lift.reach + lift.skin),
+        f"molecule grains {' '.join(text.molecule_file(number) for number, _ in enumerate(kinds, 1))}\n",
+        text.box((-outer, outer, -outer, outer, bottom, top + margin), ODD if bench.has_odd else GRAIN),
+        text.neighbors(lift.skin, BIN * (2.0 * lift.largest_radius + lift.skin)),
+        "\n# contacts\n",
+        text.contacts(_pairs(bench), lift.case.time_step),
+        _WALLS.format(
+            tube=_tube(bench),
+            groups="\n".join(f"group {lot.group} empty" for lot in lots),
+            walls="\n".join(_walls(bench, lot) for lot in lots),
+        ),
+        text.BODY_NUMBERS + text.rigid_bodies(scene.gravity),
+        _FILLING.format(
+            far=half_width,
+            far_top=top,
+            look=bench.look_steps,
+            gone_seed=gone_seed,
+            rain_radius=bench.rain_radius - lift.reach,
+            rain_bottom=lift.rain_bottom,
+            rain_top=bench.rain_top,
+            rain="\n".join(map(partial(_rain, bench), lots, seeds)),
+            watched=watched(lift, bench.check_steps),
+            dry="\n".join(f"unfix rain_{lot.group}" for lot in lots),
+            fill_steps=bench.look_steps * math.ceil(fill / bench.look_steps),
+            spheres=lift.count * lift.templates[0].shape.sphere_count,
+            quit=text.QUIT,
+        ),
+    ]
+    return "".join(parts)
 
 
 def _tube(bench: Bench) -> str:
@@ -239,14 +197,14 @@ def _tube(bench: Bench) -> str:
     return f"cylinder z 0 0 {scene.lower_radius:.9g} 0 {scene.height:.9g}"
 
 
-def _pairs(bench: Bench) -> str:
+def _pairs(bench: Bench) -> dict[str, str]:
     """Write the contacts among grains of each kind, with their adhesion."""
     among, kinds = bench.contacts()[0], (GRAIN, ODD) if bench.has_odd else (GRAIN,)
     energy = surface_energy(bench.adhesion())
-    return "\n".join(
-        f"pair_coeff {first} {second} {_words(bench, among, first == ODD, second == ODD, energy)}"
+    return {
+        f"{first} {second}": _words(bench, among, first == ODD, second == ODD, energy)
         for first, second in combinations_with_replacement(kinds, 2)
-    )
+    }
 
 
 def _walls(bench: Bench, lot: _Lot) -> str:
@@ -263,7 +221,7 @@ def _words(
     bench: Bench, contact: Contact, first_odd: bool, second_odd: bool = False, energy: float = 0.0
 ) -> str:
     """Write a contact whose first or second grain may be of the other kind."""
-    scene, laws = bench.scene, CONVENTIONS.nearest_laws(bench.case.laws)
+    scene, laws = bench.scene, LAMMPS.conventions.nearest_laws(bench.case.laws)
 
     def softened(material: Material, is_odd: bool) -> Material:
         factor = scene.odd_modulus if is_odd else 1.0
@@ -273,7 +231,7 @@ def _words(
     surface = replace(contact.surface, static_friction=factor * contact.surface.static_friction)
     first, second = softened(contact.first, first_odd), softened(contact.second, second_odd)
     coefficients = ContactCoefficients.of_pair(first, second, surface, laws, (), contact.radius, contact.mass)
-    return granular_words(replace(contact, coefficients=coefficients), CONVENTIONS.words(laws), energy)
+    return granular_words(replace(contact, coefficients=coefficients), LAMMPS.conventions.words(laws), energy)
 
 
 def surface_energy(work: float) -> float:
@@ -308,13 +266,11 @@ def _lift(bench: Bench) -> str:
         loads=" ".join(f"f_tube_{group}[4]" for group in groups),
         drag_sum="-c_drag[1]-c_drag[2]" if len(groups) > 1 else "-c_drag",
         drag=DRAG,
-        check=bench.check_steps,
-        reach=lift.reach,
-        lift_checks=math.ceil(GONE * scene.height / check_rise) + 1,
+        loop=clear_loop(bench.check_steps, math.ceil(GONE * scene.height / check_rise) + 1, lift.reach),
     )
 
 
 def _rest(bench: Bench, name: str) -> str:
     settles = name == "settle"
     limit = bench.lift.settle_limit if settles else bench.lift.rest_limit
-    return rest_loop(bench.lift, name, limit, _LIFT_ANYWAY if settles else QUIT, bench.check_steps)
+    return rest_loop(bench.lift, name, limit, _LIFT_ANYWAY if settles else text.QUIT, bench.check_steps)

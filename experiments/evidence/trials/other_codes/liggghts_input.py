@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -12,15 +11,16 @@ from dem_warp.scenes.lifted_cylinder import GONE
 from experiments.evidence.trials.other_codes.odd_lift import OddLift
 from experiments.evidence.trials.other_codes.reading import DRAG, FRAMES
 from experiments.evidence.trials.other_codes.surfaces import BIN, FILL_MARGIN, Bench
-from experiments.export.contact import values
+from experiments.export import liggghts_text as text
+from experiments.export import values
 from experiments.export.lift import prism, stl_text
-from experiments.export.liggghts import CONVENTIONS, contact_terms, material_terms, model_words
-from experiments.export.liggghts_input import grain_template
-from experiments.export.looks import rest_loop
+from experiments.export.liggghts_exporter import LIGGGHTS
+from experiments.export.script_text import Rain, clear_loop, plain, rest_loop, watched
 
 INPUT, TUBE, PLATE = "lift.in", "tube.stl", "plate.stl"
 
 GRAIN, ODD = 1, 4
+TYPES = ("grains", "tube", "plate", "grains of another kind")
 """Types of LIGGGHTS's atoms."""
 
 _SORTING = "sort 0 0.0"
@@ -29,51 +29,14 @@ _SORTING = "sort 0 0.0"
 _SPARE = 1.2
 """Distance at which LIGGGHTS looks for bridges, over that at which they break."""
 
-_SETUP = """\
-atom_style granular
-atom_modify map array {sorting}
-boundary f f f
-newton off
-communicate single vel yes
-units si
-hard_particles yes
-soft_particles yes
-region box block {low:.6g} {high:.6g} {low:.6g} {high:.6g} {bottom:.6g} {top:.6g} units box
-create_box {types} box  # 1 grains, 2 tube, 3 plate, 4 grains of another kind
-neighbor {skin:.6g} bin
-neigh_modify delay 0 every 1 check yes binsize {bin:.6g}
-{properties}
-pair_style gran model {pair_model}
-pair_coeff * *
-timestep {time_step:.9g}
-fix weight all gravity {gravity:.9g} vector {direction}
-
+_WALLS = """
 # the plate is a mesh, since it may shake
 fix tube all mesh/surface/stress file tube.stl type 2 stress on
 fix plate all mesh/surface file plate.stl type 3
-fix walls all wall/gran model {wall_model} mesh n_meshes 2 meshes tube plate
+fix walls all wall/gran model {model} mesh n_meshes 2 meshes tube plate
 fix bodies all multisphere
 
 # filling
-{templates}
-fix sizes all particledistribution/discrete/numberbased {sizes_seed} {kinds} {fractions}
-region rain cylinder z 0 0 {rain_radius:.6g} {rain_bottom:.6g} {rain_top:.6g} units box
-fix rain all insert/rate/region seed {rain_seed} distributiontemplate sizes &
-    nparticles {count} particlerate {rate:.6g} insert_every {rain_steps} overlapcheck yes all_in yes &
-    maxattempt 500 vel constant 0 0 -{rain_speed} orientation random region rain ntry_mc 10000
-
-variable speed atom sqrt(vx*vx+vy*vy+vz*vz)
-variable square atom vx*vx+vy*vy+vz*vz
-compute fastest all reduce max v_speed
-compute square all reduce ave v_square
-compute highest all reduce max z
-variable moving equal "sqrt(c_square) > {rest:.6g} || c_fastest > {calm:.6g}"
-thermo_style custom step atoms c_fastest c_square c_highest
-thermo {check}
-thermo_modify lost ignore norm no
-
-run {fill_steps}
-unfix rain
 """
 
 _LIFT = """
@@ -87,17 +50,7 @@ dump film all custom {look} {frames} id id_multisphere x y z vx vy vz radius
 dump_modify film sort id format "%d %d %.9g %.9g %.9g %.6g %.6g %.6g %.9g"
 fix balance all ave/time 1 {look} {look} f_tube[3] file {drag}
 variable rise equal 0
-variable clear equal "v_rise > c_highest + {reach:.6g}"
-variable looks loop {lift_checks}
-label lift
-run {check}
-variable rise equal ${{rise}}+{check_rise:.9g}
-if "${{clear}} == 1" then "jump SELF lifted"
-next looks
-jump SELF lift
-label lifted
-variable looks delete
-{still}
+{loop}{still}
 """
 
 _SHAKING = """
@@ -139,85 +92,60 @@ def _tube(scene: OddLift) -> np.ndarray:
 
 
 def _setup(bench: Bench) -> str:
-    scene, lift = bench.scene, bench.lift
+    scene, lift, look = bench.scene, bench.lift, bench.look_steps
     half_width, _, bottom = scene.room(lift.reach)
-    kinds = bench.kinds()
-    sizes_seed, rain_seed, *seeds = lift.seeds(2 + len(kinds))
-    words = CONVENTIONS.words(CONVENTIONS.nearest_laws(bench.case.laws))
+    top = max(bench.rain_top, (1.0 + GONE) * scene.height) + 4.0 * lift.reach
+    words = LIGGGHTS.conventions.words(LIGGGHTS.conventions.nearest_laws(bench.case.laws))
     cohesion, numbers = _cohesion(bench)
-    gravity = math.hypot(*scene.gravity)
-    look = bench.look_steps
+    pair_model = text.model_words(words | {"cohesion": cohesion})
     fill = lift.steps(lift.count / bench.rain_rate + FILL_MARGIN)
-    return _SETUP.format(
-        sorting=_SORTING,
-        low=-half_width,
-        high=half_width,
-        bottom=bottom,
-        top=max(bench.rain_top, (1.0 + GONE) * scene.height) + 4.0 * lift.reach,
-        types=4 if bench.has_odd else 3,
-        skin=lift.skin,
-        bin=BIN * (2.0 * lift.largest_radius + lift.skin),
-        properties=_properties(_tables(bench) | numbers),
-        pair_model=model_words(words | {"cohesion": cohesion}),
-        wall_model=model_words(words),
-        time_step=lift.case.time_step,
-        gravity=gravity,
-        direction=" ".join(f"{part / gravity:.9g}" for part in scene.gravity),
-        templates="\n".join(
-            grain_template(number, template, seed, ODD if is_odd else GRAIN)
-            for number, ((is_odd, template, _), seed) in enumerate(zip(kinds, seeds, strict=True), 1)
+    rain = Rain(
+        bench.rain_radius,
+        lift.rain_bottom - lift.reach,
+        bench.rain_top,
+        lift.count,
+        bench.rain_rate,
+        lift.steps(bench.rain_period),
+        scene.rain_speed,
+    )
+    kinds = [(template, part, ODD if is_odd else GRAIN) for is_odd, template, part in bench.kinds()]
+    parts = [
+        text.head(
+            TYPES if bench.has_odd else TYPES[:-1],
+            (-half_width, half_width, -half_width, half_width, bottom, top),
+            lift.skin,
+            BIN * (2.0 * lift.largest_radius + lift.skin),
+            _SORTING,
         ),
-        sizes_seed=sizes_seed,
-        kinds=len(kinds),
-        fractions=" ".join(f"grain{number} {part:.9g}" for number, (_, _, part) in enumerate(kinds, 1)),
-        rain_radius=bench.rain_radius,
-        rain_bottom=lift.rain_bottom - lift.reach,
-        rain_top=bench.rain_top,
-        rain_seed=rain_seed,
-        count=lift.count,
-        rate=bench.rain_rate,
-        rain_steps=lift.steps(bench.rain_period),
-        rain_speed=scene.rain_speed,
-        rest=scene.rest_speed,
-        calm=lift.calm_speed,
-        check=bench.check_steps,
-        fill_steps=look * math.ceil(fill / look),
-    )
+        text.contacts(_properties(bench) | numbers, pair_model, lift.case.time_step),
+        text.weight(scene.gravity),
+        _WALLS.format(model=text.model_words(words)),
+        text.pouring(kinds, rain, lift.seeds(2 + len(kinds))),
+        watched(lift, bench.check_steps),
+        f"\nrun {look * math.ceil(fill / look)}\nunfix rain\n",
+    ]
+    return "".join(parts)
 
 
-def _properties(tables: Mapping[str, str]) -> str:
-    return "\n".join(f"fix {name} all property/global {name} {text}" for name, text in tables.items())
-
-
-def _tables(bench: Bench) -> dict[str, str]:
-    """Global properties of the types: grains, tube, plate, and grains of another kind."""
+def _properties(bench: Bench) -> dict[str, str]:
+    """Write the global properties of the types: grains, tube, plate, and grains of another kind."""
     scene = bench.scene
-    among, tube, plate = (values(contact_terms(contact)) for contact in bench.contacts())
-    material, *walls = (
-        values(material_terms(part))
-        for part in (bench.case.grain_material, scene.wall_material, scene.wall_material)
+    among, tube, plate = (values(LIGGGHTS.contact_terms(contact)) for contact in bench.contacts())
+    material, wall = (
+        values(LIGGGHTS.material_terms(part)) for part in (bench.case.grain_material, scene.wall_material)
     )
-    materials = [material, *walls]
+    materials = [material, wall, wall]
     if bench.has_odd:
         materials.append(material | {"youngsModulus": scene.odd_modulus * material["youngsModulus"]})
-    tables = {name: "peratomtype " + _row([each[name] for each in materials]) for name in material}
-    for name in among:
-        factor = scene.odd_friction if name == "coefficientFriction" else 1.0
-        with_all = np.array([among[name], tube[name], plate[name], factor * among[name]])
-        full = np.empty((4, 4))
-        # walls do not touch each other; LIGGGHTS wants their numbers none the less
-        full[:] = tube[name]
-        full[0] = full[:, 0] = with_all
-        full[3] = full[:, 3] = factor * with_all[[0, 1, 2, 0]]
-        full[2, 2] = plate[name]
-        types = len(materials)
-        rows = "  ".join(_row(row[:types]) for row in full[:types])
-        tables[name] = f"peratomtypepair {types} {rows}"
-    return tables
 
+    def contact(i: int, j: int) -> dict[str, float]:
+        own, other = (0 if kind == ODD - 1 else kind for kind in sorted((i, j)))
+        # walls do not touch each other, but LIGGGHTS wants numbers for them
+        terms = (among, tube, plate)[max(own, other) if min(own, other) == 0 or i == j else 1]
+        factor = scene.odd_friction if ODD - 1 in (i, j) else 1.0
+        return terms | {"coefficientFriction": factor * terms["coefficientFriction"]}
 
-def _row(numbers: Sequence[float] | np.ndarray) -> str:
-    return " ".join(f"{number:.9g}" for number in numbers)
+    return text.properties(materials, contact)
 
 
 def _cohesion(bench: Bench) -> tuple[str, dict[str, str]]:
@@ -225,7 +153,7 @@ def _cohesion(bench: Bench) -> tuple[str, dict[str, str]]:
     types = 4 if bench.has_odd else 3
     if work := bench.adhesion():
         density = energy_density(work, bench.radius, bench.modulus)
-        pairs = "  ".join(_row([density] * types) for _ in range(types))
+        pairs = "  ".join(plain([density] * types) for _ in range(types))
         return "cohesion sjkr", {"cohesionEnergyDensity": f"peratomtypepair {types} {pairs}"}
     bridge = bench.bridges()
     if bridge is None:
@@ -240,7 +168,9 @@ def _cohesion(bench: Bench) -> tuple[str, dict[str, str]]:
         "maxSeparationDistanceRatio": reach,
     }
     written = {name: f"scalar {value:.9g}" for name, value in scalars.items()}
-    return "cohesion easo/capillary/viscous", written | {"contactAngle": "peratomtype " + _row([0.0] * types)}
+    return "cohesion easo/capillary/viscous", written | {
+        "contactAngle": "peratomtype " + plain([0.0] * types)
+    }
 
 
 def energy_density(work: float, radius: float, modulus: float) -> float:
@@ -295,12 +225,14 @@ def _lift(bench: Bench) -> str:
         turn=turn if turning else "",
         shake=shake if shaking else "",
         look=look,
-        check=bench.check_steps,
         frames=FRAMES,
         drag=DRAG,
-        reach=lift.reach,
-        lift_checks=math.ceil(GONE * scene.height / check_rise) + 1,
-        check_rise=check_rise,
+        loop=clear_loop(
+            bench.check_steps,
+            math.ceil(GONE * scene.height / check_rise) + 1,
+            lift.reach,
+            f"variable rise equal ${{rise}}+{check_rise:.9g}\n",
+        ),
         still=still,
     )
 

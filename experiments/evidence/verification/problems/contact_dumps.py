@@ -26,10 +26,9 @@ def run_commands(setup: PathSetup, key: str) -> str:
     return END.format(stride=setup.stride, steps=SAMPLES * setup.stride, format=words)
 
 
-def box_of(setup: PathSetup) -> str:
-    """Sides of a box that no sphere leaves [m]."""
-    bottom = -1e-3 if setup.path.has_plate else -0.02
-    return f"-0.02 0.02 -0.02 0.02 {bottom} 0.02"
+def box_of(setup: PathSetup) -> tuple[float, ...]:
+    """Return the sides of a box that no sphere leaves [m]."""
+    return (-0.02, 0.02, -0.02, 0.02, -1e-3 if setup.path.has_plate else -0.02, 0.02)
 
 
 def run_path(program: str, package: str, text: str, folder: Path, count: int) -> Trajectory:

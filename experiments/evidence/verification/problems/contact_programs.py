@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dem_warp import Material
 from experiments.evidence.verification.problems.contact_paths import SAMPLES, PathSetup, Trajectory
-from experiments.export import Contact, Term, values
+from experiments.export import Exporter, values
 
 
 def program_text(name: str) -> str:
@@ -19,12 +17,8 @@ def program_text(name: str) -> str:
     return (files("experiments.evidence.verification.problems") / name).read_text(encoding="utf-8")
 
 
-def path_numbers(
-    setup: PathSetup,
-    material_terms: Callable[[Material], tuple[Term, ...]],
-    contact_terms: Callable[[Contact], tuple[Term, ...]],
-) -> dict[str, Any]:
-    """All numbers of a path in SI units, with the terms of an exporter."""
+def path_numbers(setup: PathSetup, exporter: Exporter) -> dict[str, Any]:
+    """Return all numbers of a path in SI units, with the terms of an exporter."""
     contact = setup.contact
     return {
         "name": setup.path.name,
@@ -40,8 +34,8 @@ def path_numbers(
         "positions": setup.positions.tolist(),
         "speeds": setup.path.speeds,
         "spins": setup.path.spins,
-        "materials": [values(material_terms(one)) for one in (contact.first, contact.second)],
-        "terms": values(contact_terms(contact)),
+        "materials": [values(exporter.material_terms(one)) for one in (contact.first, contact.second)],
+        "terms": values(exporter.contact_terms(contact)),
     }
 
 

@@ -36,7 +36,7 @@ from experiments.evidence.verification.problems.contact_programs import (
     trajectory_of,
 )
 from experiments.evidence.verification.result import Result, Row
-from experiments.export.deme import contact_terms, material_terms
+from experiments.export.deme_exporter import DEME
 from experiments.io.files import write_text
 
 TEXT = """\
@@ -129,7 +129,7 @@ Folder = Annotated[Path, typer.Argument(help="Folder of the program, its paths a
 @app.command()
 def write(folder: Folder) -> None:
     """Write the program and its paths."""
-    numbers = [path_numbers(setup, material_terms, contact_terms) for setup in _setups().values()]
+    numbers = [path_numbers(setup, DEME) for setup in _setups().values()]
     write_text(folder / "paths.json", json.dumps(numbers, indent=1))
     write_text(folder / "paths.py", program_text(PROGRAM))
 

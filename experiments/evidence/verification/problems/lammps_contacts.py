@@ -20,7 +20,8 @@ from experiments.evidence.verification.problems.contact_paths import (
     result_of,
 )
 from experiments.evidence.verification.result import Result, Row, relative_row
-from experiments.export.lammps import CONVENTIONS, granular_words
+from experiments.export import lammps_text as text
+from experiments.export.lammps_exporter import LAMMPS, granular_words
 
 TEXT = """\
 Two spheres, and a sphere on a plate, are followed in LAMMPS (`lmp`, Debian) with the coefficients that
@@ -43,26 +44,6 @@ SHALLOWER = STIFFER**-0.4
 
 SHARE_TOLERANCE = 0.15
 """Of the ratio of two differences, beside the squares of the overlap, 2 % of a radius at the most."""
-
-_INPUT = """\
-units si
-atom_style sphere
-atom_modify map array sort 0 0
-boundary f f f
-newton off
-comm_modify vel yes
-region box block {box}
-create_box 1 box
-neighbor 0.0005 bin
-neigh_modify delay 0 every 1 check yes
-pair_style granular
-pair_coeff * * {words}
-timestep {time_step!r}
-{plate}
-{atoms}
-{weight}
-fix motion all nve/sphere
-"""
 
 
 def lammps_contacts(device: str) -> Result:
@@ -92,16 +73,19 @@ def _falls(path: ContactPath, folder: Path, device: str) -> Row:
 
 def follow(setup: PathSetup, folder: Path) -> Trajectory:
     """Follow one path in LAMMPS."""
-    words = granular_words(setup.contact, CONVENTIONS.words(setup.laws))
-    text = _INPUT.format(
-        box=box_of(setup),
-        words=words,
-        time_step=setup.time_step,
-        plate=f"fix plate all wall/gran granular {words} zplane 0 NULL" * setup.path.has_plate,
-        atoms=_atoms(setup),
-        weight=f"fix weight all gravity {setup.gravity} vector 0 0 -1" * (setup.gravity > 0.0),
-    )
-    return run_path("lmp", "lammps", text + run_commands(setup, "format line"), folder, len(setup.radii))
+    words = granular_words(setup.contact, LAMMPS.conventions.words(setup.laws))
+    parts = [
+        text.head("array sort 0 0"),
+        text.box(box_of(setup)),
+        text.neighbors(0.0005),
+        text.contacts({"* *": words}, setup.time_step),
+        f"fix plate all wall/gran granular {words} zplane 0 NULL\n" * setup.path.has_plate,
+        _atoms(setup),
+        text.weight((0.0, 0.0, -setup.gravity)),
+        "fix motion all nve/sphere\n",
+        run_commands(setup, "format line"),
+    ]
+    return run_path("lmp", "lammps", "".join(parts), folder, len(setup.radii))
 
 
 def _atoms(setup: PathSetup) -> str:
@@ -115,4 +99,4 @@ def _atoms(setup: PathSetup) -> str:
             f"group sphere{number} id {number}",
             f"velocity sphere{number} set {vx} {vy} {vz}",
         ]
-    return "\n".join(lines)
+    return "\n".join([*lines, ""])

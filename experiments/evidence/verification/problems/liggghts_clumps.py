@@ -13,13 +13,12 @@ from dem_warp import EDEM, PRESETS, ClumpShape, ContactLaws, Interaction, Materi
 from dem_warp.model import ContactCoefficients
 from dem_warp.solver import CHUNK, Solver
 from experiments.evidence.verification.problems.contact_dumps import run_path
-from experiments.evidence.verification.problems.liggghts_contacts import HEAD
 from experiments.evidence.verification.problems.setups import bodies, world
 from experiments.evidence.verification.result import Result, Row, detection_row
-from experiments.export.contact import Contact, values
+from experiments.export import Contact, values
+from experiments.export import liggghts_text as text
 from experiments.export.lift import Template
-from experiments.export.liggghts import CONVENTIONS, contact_terms, material_terms, model_words
-from experiments.export.liggghts_input import grain_template
+from experiments.export.liggghts_exporter import LIGGGHTS
 from experiments.grains.spheres import read_clump
 
 TEXT = """\
@@ -50,15 +49,7 @@ WITHIN = 1e-8
 Motion = tuple[np.ndarray, np.ndarray]
 """Velocities and spins of clumps, (grains, 3) each."""
 
-_INPUT = """\
-{head}region box block {low} {high} -0.03 0.03 -0.03 0.03 units box
-create_box 1 box
-neighbor 0.001 bin
-neigh_modify delay 0 every 1 check yes
-{properties}
-pair_style gran model {model}
-pair_coeff * *
-timestep {time_step!r}
+_RUN = """\
 fix bodies all multisphere
 {template}
 fix kinds all particledistribution/discrete 15485867 1 grain1 1.0
@@ -162,25 +153,19 @@ def _here(meeting: Meeting, shape: ClumpShape, friction: float, laws: ContactLaw
 def _in_liggghts(meeting: Meeting, shape: ClumpShape, contact: Contact, folder: Path) -> Motion:
     """Velocities and spins after the meeting in LIGGGHTS, whose clumps have those of their spheres."""
     count, steps = shape.sphere_count, CHUNKS * CHUNK
-    properties = values(material_terms(GRAIN)).items()
-    lines = [f"fix {name} all property/global {name} peratomtype {value!r}" for name, value in properties]
-    for name, value in values(contact_terms(contact)).items():
-        lines.append(f"fix {name} all property/global {name} peratomtypepair 1 {value!r}")
-    half = APART * (0.5 * PAIRS + 1.0)
-    text = _INPUT.format(
-        head=HEAD,
-        low=-half,
-        high=half,
-        properties="\n".join(lines),
-        model=model_words(CONVENTIONS.words(LAWS)),
-        time_step=STEP,
-        template=grain_template(1, Template(shape, 1.0, 1.0, GRAIN.density), 15485863),
+    half, terms = APART * (0.5 * PAIRS + 1.0), values(LIGGGHTS.contact_terms(contact))
+    properties = text.properties([values(LIGGGHTS.material_terms(GRAIN))], lambda i, j: terms)
+    model = text.model_words(LIGGGHTS.conventions.words(LAWS))
+    commands = text.head(("grains",), (-half, half, -0.03, 0.03, -0.03, 0.03), 0.001, sort="sort 0 0")
+    commands += text.contacts(properties, model, STEP)
+    commands += _RUN.format(
+        template=text.grain_template(1, Template(shape, 1.0, 1.0, GRAIN.density), 15485863),
         grains="\n".join(_grains(meeting)),
         steps=steps,
         rest=steps - 1,
         numbers=9 * " %.15g",
     )
-    last = run_path("liggghts", "liggghts", text, folder, count * len(meeting.positions))
+    last = run_path("liggghts", "liggghts", commands, folder, count * len(meeting.positions))
     spheres = (each[-1].reshape(-1, count, 3) for each in (last.positions, last.velocities, last.spins))
     places, velocities, spins = spheres
     # a sphere moves as its clump turns: v + w x r; of the mean of the spheres, r is known by the shape

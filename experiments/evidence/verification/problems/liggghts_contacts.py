@@ -16,40 +16,14 @@ from experiments.evidence.verification.problems.contact_paths import (
 )
 from experiments.evidence.verification.problems.setups import STEEL
 from experiments.evidence.verification.result import Result
-from experiments.export.contact import values
-from experiments.export.liggghts import CONVENTIONS, contact_terms, material_terms, model_words
+from experiments.export import liggghts_text as text
+from experiments.export import values
+from experiments.export.liggghts_exporter import LIGGGHTS
 
 TEXT = """\
 Two spheres, and a sphere on a plate, are followed in LIGGGHTS (`liggghts`, Debian) with the coefficients that
 `dem-warp export` gives it, and here under the laws of the same name. An error is the largest difference of
 the two trajectories over their size."""
-
-HEAD = """\
-atom_style granular
-atom_modify map array sort 0 0
-boundary f f f
-newton off
-communicate single vel yes
-units si
-hard_particles yes
-soft_particles yes
-"""
-"""First commands of an input of LIGGGHTS."""
-
-_INPUT = """\
-{head}region box block {box} units box
-create_box 2 box
-neighbor 0.0005 bin
-neigh_modify delay 0 every 1 check yes
-{properties}
-pair_style gran model {model}
-pair_coeff * *
-timestep {time_step!r}
-{plate}
-{atoms}
-{weight}
-fix motion all nve/sphere
-"""
 
 
 def liggghts_contacts(device: str) -> Result:
@@ -70,25 +44,19 @@ def liggghts_contacts(device: str) -> Result:
 
 def follow(setup: PathSetup, folder: Path) -> Trajectory:
     """Follow one path in LIGGGHTS."""
-    model = model_words(CONVENTIONS.words(setup.laws))
-    materials = [values(material_terms(each)) for each in (setup.grain, STEEL)]
-    lines = [
-        f"fix {name} all property/global {name} peratomtype {materials[0][name]!r} {materials[1][name]!r}"
-        for name in materials[0]
+    model = text.model_words(LIGGGHTS.conventions.words(setup.laws))
+    materials = [values(LIGGGHTS.material_terms(each)) for each in (setup.grain, STEEL)]
+    terms = values(LIGGGHTS.contact_terms(setup.contact))
+    parts = [
+        text.head(("grains", "plate"), box_of(setup), 0.0005, sort="sort 0 0"),
+        text.contacts(text.properties(materials, lambda i, j: terms), model, setup.time_step),
+        f"fix plate all wall/gran model {model} primitive type 2 zplane 0.0\n" * setup.path.has_plate,
+        _atoms(setup),
+        text.weight((0.0, 0.0, -setup.gravity)),
+        "fix motion all nve/sphere\n",
+        run_commands(setup, "format"),
     ]
-    for name, value in values(contact_terms(setup.contact)).items():
-        lines.append(f"fix {name} all property/global {name} peratomtypepair 2" + 4 * f" {value!r}")
-    text = _INPUT.format(
-        head=HEAD,
-        box=box_of(setup),
-        properties="\n".join(lines),
-        model=model,
-        time_step=setup.time_step,
-        plate=f"fix plate all wall/gran model {model} primitive type 2 zplane 0.0" * setup.path.has_plate,
-        atoms=_atoms(setup),
-        weight=f"fix weight all gravity {setup.gravity} vector 0 0 -1" * (setup.gravity > 0.0),
-    )
-    return run_path("liggghts", "liggghts", text + run_commands(setup, "format"), folder, len(setup.radii))
+    return run_path("liggghts", "liggghts", "".join(parts), folder, len(setup.radii))
 
 
 def _atoms(setup: PathSetup) -> str:
@@ -100,4 +68,4 @@ def _atoms(setup: PathSetup) -> str:
             f"set atom {number} diameter {2.0 * radius!r} density {setup.grain.density!r} "
             f"vx {vx} vy {vy} vz {vz} omegax {wx} omegay {wy} omegaz {wz}",
         ]
-    return "\n".join(lines)
+    return "\n".join([*lines, ""])

@@ -22,7 +22,7 @@ from experiments.evidence.verification.problems.contact_programs import (
     trajectory_of,
 )
 from experiments.evidence.verification.result import Result
-from experiments.export.yade import contact_terms, material_terms
+from experiments.export.yade_exporter import YADE
 
 TEXT = """\
 Two spheres, and a sphere on a plate, are followed in Yade (Debian) with the coefficients that `dem-warp
@@ -55,7 +55,7 @@ def follow(setup: PathSetup, folder: Path) -> Trajectory:
     """Follow one path in Yade."""
     if (yade := shutil.which("yade")) is None:
         raise ValueError("yade must be installed (Debian package yade), found none")
-    numbers = path_numbers(setup, material_terms, contact_terms)
+    numbers = path_numbers(setup, YADE)
     (folder / "path.json").write_text(json.dumps(numbers), encoding="utf-8")
     (folder / "path.py").write_text(program_text(PROGRAM), encoding="utf-8")
     with (folder / "screen.log").open("w", encoding="utf-8") as screen:

@@ -24,7 +24,7 @@ from experiments.evidence.performance.peers.library import PEERS, PeerName
 from experiments.evidence.performance.peers.peer import PeerRun, Plan
 from experiments.evidence.performance.roofline import world_contacts
 from experiments.evidence.performance.timing import start
-from experiments.export.lammps import TSUJI
+from experiments.export.lammps_exporter import TSUJI
 
 PLAN = Plan((1e-4, 2e-4), run_in=700, steps=300, stretches=2)
 MODULUS = 2.0 * 34.325e6 / 400.0 * 1.29  # E = 2 G (1 + v), softened

@@ -1,16 +1,15 @@
-"""Codes that contacts and tests can be translated for: one file and one line here each."""
+"""Registry of exporters: each code has one line here."""
 
 from __future__ import annotations
 
 from dem_warp.registry import Registry
-from experiments.export.deme import DEME
-from experiments.export.edem import EDEM
+from experiments.export.deme_exporter import DEME
 from experiments.export.exporter import Exporter
-from experiments.export.lammps import LAMMPS
-from experiments.export.liggghts import LIGGGHTS
-from experiments.export.mercury import MERCURY
-from experiments.export.rocky import ROCKY
-from experiments.export.yade import YADE
+from experiments.export.lammps_exporter import LAMMPS
+from experiments.export.liggghts_exporter import LIGGGHTS
+from experiments.export.mercury_exporter import MERCURY
+from experiments.export.sheet import EDEM, ROCKY
+from experiments.export.yade_exporter import YADE
 
 
 def _check(name: str, exporter: object, known: object) -> None:

@@ -1,26 +1,31 @@
-"""The lifted cylinder as a driver of MercuryDPM, in C++."""
+"""MercuryDPM: ``HertzianViscoelasticMindlinRollingTorsionSpecies``, as a driver in C++."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from experiments.export.exporter import Translated, Translation
-from experiments.export.lift import Lift, disc, prism
+from dem_warp.model import WorldSetup
+from experiments.export.code_table import CodeTest, code_exporter
+from experiments.export.contact import Contact
+from experiments.export.exporter import Translation
+from experiments.export.laws import Translated
+from experiments.export.lift import disc, prism
 from experiments.export.same_rain import (
-    HEAP,
-    RAIN_FILE,
-    clump_texts,
     phases,
-    rain_text,
-    same_rain_rows,
+    same_rain_files,
+    same_rain_translation,
     template,
     test_numbers,
     world_of,
 )
+
+SOFTENING = 1.5
+"""Mindlin's tangential spring over MercuryDPM's at the same modulus."""
 
 SOURCE, HEADER = "lift.cpp", "test.h"
 
@@ -46,45 +51,30 @@ _ROWS = (
 )
 
 
-def translate_lift(
-    lift: Lift, contacts: Sequence[Mapping[str, float]], warnings: tuple[str, ...], laws: Sequence[Translated]
-) -> Translation:
-    """Write the driver and what it reads.
+def contact_numbers(contact: Contact) -> dict[str, float]:
+    """Calculate the terms that are no coefficients of ours."""
+    law = contact.coefficients
+    return {
+        "Dissipation": math.sqrt(1.5) * law.damping,
+        "EffectiveShearModulus": SOFTENING * law.shear_modulus,
+        "SlidingDissipation": law.damping * law.tangential_damping / math.sqrt(SOFTENING),
+    }
 
-    Parameters
-    ----------
-    lift
-        The test.
-    contacts
-        Terms of the contacts of grains with grains, the tube and the plate.
-    warnings, laws
-        What MercuryDPM lacks of the test, and the rows of the README on its contact laws.
-    """
-    scene, world = lift.scene, world_of(lift)
+
+def translate(test: CodeTest) -> Translation:
+    """Write the driver of a lifted cylinder and what it reads."""
+    scene, world = test.lift.scene, world_of(test.lift)
     walls = {"tube.csv": prism(scene.diameter / 2, scene.height)}
     if scene.plate_diameter is not None:
         walls["plate.csv"] = disc(scene.plate_diameter / 2)
-    files = {
-        SOURCE: template("mercury"),
-        HEADER: header(lift, contacts),
-        RAIN_FILE: rain_text(world),
-        **clump_texts(world),
-        **{name: _table(triangles) for name, triangles in walls.items()},
-    }
-    return Translation(
-        files=files,
-        main=SOURCE,
-        command=("./lift",),
-        heap=HEAP,
-        translated=(*same_rain_rows(lift), *laws, *_ROWS),
-        warnings=warnings,
-        comment="//",
-    )
+    texts = {SOURCE: template("mercury"), HEADER: _header(test, world)}
+    files = texts | same_rain_files(world) | {name: _table(sides) for name, sides in walls.items()}
+    return same_rain_translation(test, files, SOURCE, ("./lift",), _ROWS, comment="//")
 
 
-def header(lift: Lift, contacts: Sequence[Mapping[str, float]]) -> str:
+def _header(test: CodeTest, world: WorldSetup) -> str:
     """Write the numbers of a test as constants of C++, in SI units."""
-    world = world_of(lift)
+    lift = test.lift
     numbers, course = test_numbers(lift, world), phases(lift, world)
     look = max(round(course.pop("look") / world.time_step), 1)
     course["duration"] = course["duration"] or 0.0
@@ -100,7 +90,9 @@ def header(lift: Lift, contacts: Sequence[Mapping[str, float]]) -> str:
         "shape_count": len(world.shapes),
         **course,
     }
-    rows = ",\n    ".join(f"{{{', '.join(f'{value:.17g}' for value in one.values())}}}" for one in contacts)
+    rows = ",\n    ".join(
+        f"{{{', '.join(f'{value:.17g}' for value in one.values())}}}" for one in test.contact_values
+    )
     names = ", ".join(f'"{name}"' for name in numbers["clumps"])
     lines = [
         "// Numbers of the test, in SI units; lift.cpp says what they are for.",
@@ -142,3 +134,6 @@ def _kind(value: Any) -> str:
 
 def _written(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else f"{value:.17g}"
+
+
+MERCURY = code_exporter("mercurydpm", translate, contact_numbers)

@@ -1,14 +1,16 @@
-"""The lifted cylinder as a Python program of DEM-Engine."""
+"""DEM-Engine (package ``deme``): its frictional Hertzian model, driven by a Python program."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 
 import numpy as np
 
-from experiments.export.exporter import Translated, Translation
-from experiments.export.lift import SIDES, Lift, disc
-from experiments.export.same_rain import HEAP, SCRIPT, program, program_files, same_rain_rows, world_of
+from experiments.export.code_table import CodeTest, code_exporter
+from experiments.export.exporter import Translation
+from experiments.export.laws import Translated
+from experiments.export.lift import SIDES, disc
+from experiments.export.same_rain import SCRIPT, program_translation, world_of
 
 THICKNESS = 1.1
 """Thickness of the tube's wall, in radii of the largest sphere: triangles are felt from one side, up to a
@@ -34,46 +36,25 @@ _ROWS = (
 )
 
 
-def translate_lift(
-    lift: Lift,
-    materials: Sequence[dict[str, float]],
-    contacts: Sequence[dict[str, float]],
-    warnings: tuple[str, ...],
-    laws: Sequence[Translated],
-) -> Translation:
-    """Write the program and what it reads.
-
-    Parameters
-    ----------
-    lift
-        The test.
-    materials, contacts
-        Terms of the grains, the tube and the plate, and of their contacts with grains.
-    warnings, laws
-        What DEM-Engine lacks of the test, and the rows of the README on its contact laws.
-    """
-    scene, world = lift.scene, world_of(lift)
+def translate(test: CodeTest) -> Translation:
+    """Write the program of a lifted cylinder and what it reads."""
+    lift, scene, world = test.lift, test.lift.scene, world_of(test.lift)
+    # its contact radius is that of the circle of overlap, sqrt(2) times Hertz's where spheres are equal
+    stiffening = math.sqrt(2.0) if lift.case.laws.normal == "hertz" else 1.0
+    unused = {"CoR": 0.5, "mu": 0.0, "Crr": 0.0}
     numbers = {
-        "materials": list(materials),
-        "contacts": list(contacts),
+        "materials": [each | {"E": each["E"] / stiffening} | unused for each in test.material_values],
+        "contacts": test.contact_values,
         "release": scene.release(float(world.bounding_radii.max())),
         "domain": world.domain,
         "top_speed": scene.top_speed,
         "plate": scene.plate_diameter is not None,
     }
-    walls = {
-        "tube.obj": obj_text(thick_tube(scene.diameter / 2, scene.height, THICKNESS * lift.largest_radius))
-    }
+    tube = thick_tube(scene.diameter / 2, scene.height, THICKNESS * lift.largest_radius)
+    walls = {"tube.obj": obj_text(tube)}
     if scene.plate_diameter is not None:
         walls["plate.obj"] = obj_text(disc(scene.plate_diameter / 2))
-    return Translation(
-        files=program_files(lift, world, program("DEM-Engine", "deme"), numbers) | walls,
-        main=SCRIPT,
-        command=("python3", SCRIPT),
-        heap=HEAP,
-        translated=(*same_rain_rows(lift), *laws, *_ROWS),
-        warnings=warnings,
-    )
+    return program_translation(test, world, "deme", ("python3", SCRIPT), numbers, _ROWS, walls)
 
 
 def thick_tube(radius: float, height: float, thickness: float, sides: int = SIDES) -> np.ndarray:
@@ -106,3 +87,6 @@ def obj_text(triangles: np.ndarray) -> str:
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in corners]
     lines += [f"f {a} {b} {c}" for a, b, c in (numbers.reshape(-1, 3) + 1).tolist()]
     return "\n".join([*lines, ""])
+
+
+DEME = code_exporter("deme", translate)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from experiments.export.exporter import ExportedTest, Translation
+from experiments.export.exporters import EXPORTERS
 from experiments.export.facts import grain_rows, laws_row
-from experiments.export.library import EXPORTERS
 from experiments.io.errors import InputError, Problem
 from experiments.io.files import write_text
 from experiments.io.version import program_version

@@ -1,0 +1,109 @@
+"""Codes by their tables: terms and laws of each are in ``codes/NAME.toml``, its input in a function."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+from operator import attrgetter
+from typing import Any
+
+from dem_warp import Material
+from experiments.export.contact import Contact, Term, contacts_of, values
+from experiments.export.exporter import ExportedTest, Exporter, Translation
+from experiments.export.laws import LawsOfCode, Translated, mechanism_warnings
+from experiments.export.lift import Lift
+
+Numbers = Callable[[Contact], Mapping[str, float]]
+"""Values of the terms of a contact that are no attribute of it, by their keys in the table."""
+
+
+@dataclass(frozen=True)
+class CodeTest:
+    """A lifted cylinder with the contacts that a code can have."""
+
+    lift: Lift
+    exporter: Exporter
+    """Exporter of the code."""
+    contacts: tuple[Contact, Contact, Contact]
+    """Contacts of grains with grains, the tube and the plate under the code's laws."""
+    words: Mapping[str, str]
+    """Words of the code for each law."""
+    rows: tuple[Translated, ...]
+    """Rows of the README about the laws."""
+    warnings: tuple[str, ...]
+    """Laws and mechanisms that the code lacks."""
+
+    @property
+    def material_values(self) -> list[dict[str, float]]:
+        """Terms of the materials of grains, tube and plate by name."""
+        materials = (self.contacts[0].first, *(contact.second for contact in self.contacts[1:]))
+        return [values(self.exporter.material_terms(material)) for material in materials]
+
+    @property
+    def contact_values(self) -> list[dict[str, float]]:
+        """Terms of the contacts by name."""
+        return [values(self.exporter.contact_terms(contact)) for contact in self.contacts]
+
+
+def code_exporter(
+    name: str, translate: Callable[[CodeTest], Translation], numbers: Numbers = lambda contact: {}
+) -> Exporter:
+    """Make the exporter of the code with a table; `translate` writes the input of its tests."""
+    table = code_table(name)
+    code, source = table["code"], table["source"]
+    laws = LawsOfCode(code, table["laws"], table.get("nearest", {}))
+
+    def material_terms(material: Material) -> tuple[Term, ...]:
+        return tuple(_terms(table.get("material", {}), material, {}, source))
+
+    def contact_terms(contact: Contact) -> tuple[Term, ...]:
+        return tuple(_terms(table["contact"], contact, numbers(contact), source))
+
+    def translated(test: ExportedTest) -> Translation:
+        return translate(_code_test(exporter, laws, test))
+
+    exporter = Exporter(
+        code,
+        table["title"],
+        table["differs"],
+        material_terms,
+        contact_terms,
+        translated,
+        laws,
+        table.get("unproven", ""),
+    )
+    return exporter
+
+
+@cache
+def code_table(name: str) -> Mapping[str, Any]:
+    """Read the table of a code."""
+    return tomllib.loads((files("experiments.export") / "codes" / f"{name}.toml").read_text("utf-8"))
+
+
+def _terms(
+    rows: Mapping[str, Mapping[str, str]], of: object, numbers: Mapping[str, float], source: str
+) -> Iterator[Term]:
+    for key, row in rows.items():
+        if "needs" in row and not attrgetter(row["needs"])(of):
+            continue
+        value = attrgetter(row["value"])(of) if "value" in row else numbers.get(key)
+        if value is not None:
+            name = row.get("name", key)
+            yield Term(name, value, row.get("unit", "1"), row["formula"], row.get("source", source))
+
+
+def _code_test(exporter: Exporter, laws: LawsOfCode, test: ExportedTest) -> CodeTest:
+    lift, own = Lift(test), test.case.laws
+    case = replace(lift.case, mechanisms=(), laws=laws.nearest_laws(own))
+    heaviest = max(template.mass for template in lift.templates)
+    among, tube = contacts_of(case, lift.largest_radius, heaviest)
+    coefficients = lift.scene.contacts(case)[2]
+    surface = replace(tube.surface, static_friction=coefficients.static_friction)
+    plate = replace(tube, surface=surface, coefficients=coefficients)
+    warnings = laws.warnings(own) + mechanism_warnings(test.case, exporter.code)
+    rows = tuple(laws.translated(own))
+    return CodeTest(lift, exporter, (among, tube, plate), laws.words(own), rows, warnings)

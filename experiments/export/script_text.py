@@ -1,0 +1,149 @@
+"""Parts that inputs of LAMMPS and LIGGGHTS share: monitored quantities and loops over looks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from experiments.export.lift import LOOK, Lift
+
+HEAP_FILE = "heap.dump"
+"""Dump of the final heap."""
+
+ROUNDING = 1e-9
+"""Rounding error of a quotient of times, in looks."""
+
+_WATCHED = """\
+# grains are looked at every {look} steps
+variable speed atom sqrt(vx*vx+vy*vy+vz*vz)
+variable square atom vx*vx+vy*vy+vz*vz
+variable above atom "z > {strike:.6g} && v_speed < {slow:.6g}"
+compute fastest all reduce max v_speed
+compute square all reduce ave v_square
+compute heaped all reduce sum v_above
+compute highest all reduce max z
+variable heaped equal c_heaped
+variable moving equal "sqrt(c_square) > {rest:.6g} || c_fastest > {calm:.6g}"
+thermo_style custom step atoms cpu c_fastest c_square c_heaped c_highest
+thermo {look}
+thermo_modify lost ignore norm no
+"""
+
+_FILL = """\
+variable looks loop {looks}
+label fill
+run {run}
+if "${{heaped}} >= {heaped}" then "jump SELF full"
+next looks
+jump SELF fill
+print "ERROR: the filling did not end within {limit:.6g} s"
+{quit}
+label full
+variable looks delete
+unfix rain
+"""
+
+_CLEAR = """\
+variable clear equal "v_rise > c_highest + {clearance:.6g}"
+variable looks loop {looks}
+label lift
+run {look}
+{rise}if "${{clear}} == 1" then "jump SELF lifted"
+next looks
+jump SELF lift
+label lifted
+variable looks delete
+"""
+
+_REST = """
+# until the grains have been slow for {rest_time} s
+variable looks loop {limit_looks}
+variable calm equal 0
+label {name}
+run {look}
+if "${{moving}} == 1" then "variable calm equal 0" else "variable calm equal ${{calm}}+1"
+if "${{calm}} >= {calm_looks}" then "jump SELF {name}_done"
+next looks
+jump SELF {name}
+print "ERROR: no rest within {limit:.6g} s"
+{quit}
+label {name}_done
+variable looks delete
+"""
+
+
+@dataclass(frozen=True)
+class Rain:
+    """Space, number and rate of the grains that are poured."""
+
+    radius: float
+    bottom: float
+    top: float
+    """Cylinder that they are put in [m]."""
+    count: int
+    rate: float
+    """Grains a second."""
+    steps: int
+    """Steps between two insertions."""
+    speed: float
+    """Speed downwards [m/s]."""
+
+
+def plain(numbers: Iterable[float], digits: int = 9) -> str:
+    """Write numbers with so many digits, with spaces between."""
+    return " ".join(f"{number:.{digits}g}" for number in numbers)
+
+
+def watched(lift: Lift, look: int | None = None) -> str:
+    """Write the monitored quantities: speeds, the highest sphere, and the slow ones above the rim.
+
+    `look` is the number of steps between two looks; default: that of `LOOK`.
+    """
+    return _WATCHED.format(
+        look=look or lift.steps(LOOK),
+        strike=lift.strike,
+        slow=0.5 * lift.scene.rain_speed,
+        rest=lift.scene.rest_speed,
+        calm=lift.calm_speed,
+    )
+
+
+def fill_loop(lift: Lift, run: str, quit: str) -> str:
+    """Write the loop until grains are heaped above the rim; `run` are the words of one look."""
+    return _FILL.format(
+        looks=max(round(lift.fill_limit / LOOK), 1),
+        run=run,
+        heaped=lift.heaped * min(template.shape.sphere_count for template in lift.templates),
+        limit=lift.fill_limit,
+        quit=quit,
+    )
+
+
+def clear_loop(look: int, looks: int, clearance: float, rise: str = "") -> str:
+    """Write the loop until the tube is clear of the heap.
+
+    `look` are the steps between two looks, `rise` is the line that moves the variable of that name.
+    """
+    return _CLEAR.format(look=look, looks=looks, clearance=clearance, rise=rise)
+
+
+def rest_loop(lift: Lift, name: str, limit: float, quit: str, look: int | None = None) -> str:
+    """Write the loop until rest, which ends the program after a time limit [s].
+
+    `quit` is the code's word for that; `look` as in `watched`.
+    """
+    look_time = LOOK if look is None else look * lift.case.time_step
+    return _REST.format(
+        name=name,
+        look=lift.steps(LOOK) if look is None else look,
+        rest_time=lift.scene.rest_time,
+        calm_looks=_count(lift.scene.rest_time / look_time),
+        limit=limit,
+        limit_looks=_count(limit / look_time),
+        quit=quit,
+    )
+
+
+def _count(looks: float) -> int:
+    return max(math.ceil(looks - ROUNDING), 1)
