@@ -1,8 +1,8 @@
 """The public names: each is loaded with its module when it is first used."""
 
+from .curves.curve_emulator import CurveEmulator
 from .curves.curve_fit import CurveFit, Forecast, MeasuredCurve, fit_curves
-from .curves.curves import CurveEmulator
-from .curves.profiles import Mode, ProfileSample, scatter_of_views
+from .curves.profile_sample import Mode, ProfileSample, scatter_of_views
 from .design.anova import ErrorTerm, pure_error
 from .design.design import Design
 from .design.factors import Category, Factor
@@ -23,14 +23,13 @@ from .response.analysis.desirability import BestSetting, Wish, maximize, minimiz
 from .response.analysis.diagnostics import BoxCox, RobustTable, box_cox, influence, robust_coefficients
 from .response.analysis.formula import LinearFit, fit_formula, fit_mixture
 from .response.analysis.optimum_region import stationary_region
-from .response.joint import Goal, JointFit, joint_fit
-from .response.optimum import StationaryPoint
+from .response.joint_fit import Goal, JointFit, joint_fit
 from .response.region import Region
-from .response.surface import Surface, fit_surface
+from .response.response_surface import Surface, fit_surface
+from .response.surface_points import StationaryPoint
 from .response.transfer import Transfer, transfer, transfer_points
 from .samples.agreement import Agreement, Estimate, agreement
-from .samples.compare import Comparison, compare_means
-from .samples.noise import (
+from .samples.noise_floor import (
     NoiseFloor,
     VarianceRatio,
     curvature_test,
@@ -40,7 +39,8 @@ from .samples.noise import (
     variance_ratio,
 )
 from .samples.sample import Sample
-from .screen.screening import ScreenResult, aliases, screen
+from .samples.two_means import Comparison, compare_means
+from .screen.screened_effects import ScreenResult, aliases, screen
 from .screen.steepest import ClimbPath, climb_table, steepest_path
 from .screen.two_level_effects import TwoLevelEffects, two_level_effects
 

@@ -24,7 +24,7 @@ LIBRARIES = {
 }
 LATE_LIBRARIES = {
     "dem_warp": {"trimesh"},
-    "doe": {"sklearn", "threadpoolctl"},
+    "doe": {"threadpoolctl"},
     "imaging": {"PIL", "pillow_heif", "pyvista"},
 }
 
@@ -58,7 +58,6 @@ COMES_WITH = {
     "dask": "distributed",
     "markupsafe": "jinja2",
     "pydantic_core": "pydantic",
-    "threadpoolctl": "scikit-learn",
     "torch": "sbi",
     "vtkmodules": "pyvista",
 }
@@ -217,7 +216,7 @@ def test_every_library_is_declared() -> None:
         ("dem_warp.simulation", {"pandas", "scipy", "pyvista", "cv2", "trimesh", "pydantic", "typer"}),
         ("dem_warp.scenes.library", {"warp", "scipy"}),
         ("doe", {"numpy", "pandas", "scipy"}),
-        ("doe.response.surface", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot"}),
+        ("doe.response.response_surface", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot"}),
         ("doe.discrepancy", {"numpy", "pandas", "scipy"}),
         ("doe.discrepancy.analysis", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot", "sklearn"}),
         ("imaging", {"cv2", "numpy", "scipy"}),

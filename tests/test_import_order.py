@@ -16,8 +16,12 @@ ROOMS = (
     "report", "journal", "runs", "api", "live", "commands", "cli", "studies", "evidence",
 )  # fmt: skip
 
-# Folders of `doe.discrepancy` in the order of use.
-STEPS = ("threads", "problem", "emulation", "fitting", "contest", "verdict", "analysis")
+# Folders of `doe`, and of `doe.discrepancy` in the order of use.
+DOE = (
+    "errors", "arguments", "numerics", "design", "samples", "response", "screen", "curves", "plots",
+    "discrepancy",
+)  # fmt: skip
+STEPS = ("problem", "emulation", "fitting", "contest", "verdict", "analysis")
 
 
 def modules(package: str) -> dict[str, Path]:
@@ -60,7 +64,9 @@ def test_no_module_imports_itself_around_others(package: str) -> None:
     assert circle({name: set(imported(path, known)) for name, path in known.items()}) == []
 
 
-@pytest.mark.parametrize(("package", "order"), [("experiments", ROOMS), ("doe.discrepancy", STEPS)])
+@pytest.mark.parametrize(
+    ("package", "order"), [("experiments", ROOMS), ("doe", DOE), ("doe.discrepancy", STEPS)]
+)
 def test_the_rooms_of_a_package_stand_on_one_another(package: str, order: tuple[str, ...]) -> None:
     known = modules(package.partition(".")[0])
     rooms = {name: room(name, package) for name in known if name.startswith(package + ".")}

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from doe.checks import checked_count, checked_kind, checked_list, checked_map, checked_number, real_array
+from doe.arguments import checked_count, checked_kind, checked_list, checked_map, checked_number, real_array
 from doe.curves.compatible import compatible_points, even_points
-from doe.curves.curves import CurveEmulator
-from doe.discrepancy.threads import in_one_thread
+from doe.curves.curve_emulator import CurveEmulator
 from doe.errors import RuleError
+from doe.numerics.one_thread import in_one_thread
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from statsmodels.regression.linear_model import OLS, RegressionResults
 
-from doe.checks import checked_kind
+from doe.arguments import checked_kind
 from doe.design.labels import check_labels, in_rows
 from doe.errors import DesignError
 

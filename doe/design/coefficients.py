@@ -7,7 +7,7 @@ import pandas as pd
 from statsmodels.regression.linear_model import RegressionResults
 
 from doe.design.anova import COLUMNS, ErrorTerm, f_ratio
-from doe.design.terms import Term
+from doe.design.polynomial_terms import Term
 
 ORDERS = ("first order", "two-way interactions", "pure quadratic", "higher order")
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from doe.checks import (
+from doe.arguments import (
     checked_flag,
     checked_kind,
     checked_list,

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from doe.checks import real_array
+from doe.arguments import real_array
 from doe.errors import DesignError
 
 

@@ -6,10 +6,10 @@ from .contest.power import Power
 from .contest.slips import Slip
 from .emulation.bank import Bank, bank_points, load_bank, make_bank
 from .emulation.emulator import Emulator, fit_emulator, fitted
-from .fitting.fit import Interval
-from .problem.measured import Calibration, Measured
+from .fitting.model_fit import Interval
+from .problem.outcomes import Outcomes, Point, Simulator
+from .problem.replicates import Calibration, Measured
 from .problem.settings import Settings, settings_of
-from .problem.simulator import Outcomes, Point, Simulator
 from .problem.space import MechanismRange, SearchSpace
 from .verdict.before_after import BeforeAfter
 from .verdict.discovery import (

@@ -13,22 +13,21 @@ from functools import partial
 
 import numpy as np
 
+from doe.discrepancy.contest.fresh_runs import Laboratory, Request
 from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, Question, find_gap
 from doe.discrepancy.contest.held_out import held_out_gain
-from doe.discrepancy.contest.laboratory import Laboratory, Request
 from doe.discrepancy.contest.power import Effects, Power, powers, shown_apart
 from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
 from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
 from doe.discrepancy.contest.signatures import Signatures, signatures
 from doe.discrepancy.contest.slips import find_slips, without
 from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.fitting.evidence import Evidence, gather
-from doe.discrepancy.fitting.fit import Fitted, fit, weigh
-from doe.discrepancy.fitting.model import Model, Stack
-from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import Evidence, gather
+from doe.discrepancy.fitting.model_fit import Fitted, fit, weigh
+from doe.discrepancy.problem.outcomes import Outcomes, Point
+from doe.discrepancy.problem.replicates import Measured
 from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.simulator import Outcomes, Point
-from doe.discrepancy.threads import in_one_thread, steps_in_one_thread
 from doe.discrepancy.verdict.before_after import BeforeAfter, compare
 from doe.discrepancy.verdict.conclusion import (
     Assessment,
@@ -54,6 +53,7 @@ from doe.discrepancy.verdict.records import (
     fit_record,
     scatter_notes,
 )
+from doe.numerics.one_thread import in_one_thread, steps_in_one_thread
 
 Analysis = Generator[list[Point], Outcomes, Discovery]
 

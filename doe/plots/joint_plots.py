@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from doe.checks import checked_kind, checked_list
+from doe.arguments import checked_kind, checked_list
 from doe.design.design import checked_setting
 from doe.errors import DesignError
-from doe.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILION
+from doe.plots.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILION
 from doe.plots.style import canvas, key
-from doe.response.joint import JointFit
+from doe.response.joint_fit import JointFit
 from doe.response.region import Region
 
 COLORS = (BLUE, ORANGE, PURPLE, MUTED)

@@ -8,13 +8,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from doe.checks import checked_count, checked_kind, checked_map, checked_number
+from doe.arguments import checked_count, checked_kind, checked_map, checked_number
 from doe.design.design import checked_setting
 from doe.design.factors import Factor
 from doe.design.points import coded_points
 from doe.errors import DesignError
-from doe.response.surface import Surface
-from doe.screen.screening import ScreenResult
+from doe.response.response_surface import Surface
+from doe.screen.screened_effects import ScreenResult
 
 MOST_POINTS = 2_000
 """Points along an axis of a figure."""

@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from doe.checks import checked_count, checked_number
+from doe.arguments import checked_count, checked_number
 from doe.design.points import natural_points
 from doe.response.fitted import FittedSurface
 from doe.response.quadratic import QuadraticForm

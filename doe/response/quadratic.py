@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.design.terms import Term, term_name
+from doe.design.polynomial_terms import Term, term_name
 from doe.errors import DesignError
 
 

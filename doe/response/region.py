@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from doe.checks import checked_count, checked_df, checked_number
+from doe.arguments import checked_count, checked_df, checked_number
 from doe.design.factors import Factor
 from doe.design.points import natural_points
 from doe.errors import DesignError

@@ -22,7 +22,7 @@ from scipy import optimize, stats
 from scipy.linalg import block_diag
 from statsmodels.regression.linear_model import GLS
 
-from doe.checks import (
+from doe.arguments import (
     MOST,
     checked_count,
     checked_df,
@@ -35,11 +35,11 @@ from doe.checks import (
 )
 from doe.design.design import Design
 from doe.design.points import coded_points, natural_points
-from doe.design.terms import INTERCEPT, model_matrix
+from doe.design.polynomial_terms import INTERCEPT, model_matrix
 from doe.errors import DesignError
-from doe.response import optimum, region
+from doe.response import region, surface_points
 from doe.response.quadratic import QuadraticForm
-from doe.response.surface import Surface
+from doe.response.response_surface import Surface
 from doe.samples.sample import Sample
 
 SCALE_SD = 0.25
@@ -136,8 +136,8 @@ class Transfer:
         return QuadraticForm.of(self.design.names, terms[1:], values)
 
     def nearest(self, target: float, to: dict[str, float] | None = None, extent: float = 1.0) -> pd.Series:
-        """Return the target contour's point nearest to a point, natural (see ``doe.response.optimum.nearest``)."""
-        return optimum.nearest(self, target, to, extent)
+        """Return the target contour's point nearest to a point, natural (see ``doe.response.surface_points.nearest``)."""
+        return surface_points.nearest(self, target, to, extent)
 
     def compatible_region(
         self, target: float | Sample, alpha: float = 0.05, extent: float = 1.0

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, stats
 
-from doe.checks import checked_level, checked_number, real_array
+from doe.arguments import checked_level, checked_number, real_array
 from doe.design.labels import same_labels
 from doe.errors import DesignError
 

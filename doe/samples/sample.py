@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.checks import checked_count, checked_number, real_array
+from doe.arguments import checked_count, checked_number, real_array
 from doe.errors import DesignError
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, special, stats
 
-from doe.checks import checked_level
+from doe.arguments import checked_level
 
 MOST = 1.15
 """Largest level over alpha: the coverage for .95 is nowhere below .9425."""

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from doe.checks import (
+from doe.arguments import (
     MOST,
     checked_count,
     checked_flag,
@@ -22,8 +22,8 @@ from doe.design.design import Design, numbered, observations
 from doe.design.factors import Factor
 from doe.design.points import coded_points
 from doe.errors import DesignError
-from doe.response.surface import Surface
-from doe.screen.screening import ScreenResult
+from doe.response.response_surface import Surface
+from doe.screen.screened_effects import ScreenResult
 
 ROUNDING = 1e-12
 """Slope relative to the largest coefficient below which it is a rounding error of the fit."""

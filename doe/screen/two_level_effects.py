@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from doe.checks import checked_count, checked_flag, checked_kind, checked_level
+from doe.arguments import checked_count, checked_flag, checked_kind, checked_level
 from doe.design.anova import block_columns
 from doe.design.design import Design, observations
 from doe.design.families.aliases import two_level_runs
-from doe.design.terms import Term, parsed_terms, term_name
+from doe.design.polynomial_terms import Term, parsed_terms, term_name
 from doe.errors import DesignError
 from doe.samples.lenth import orthogonal_null, pseudo_error
 

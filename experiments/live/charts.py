@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from doe.palette import BLUE, SERIES, VERMILION
+from doe.plots.palette import BLUE, SERIES, VERMILION
 from experiments.calibrate.results import STAGES
 from experiments.io.errors import InputError
 from experiments.live.folder import inside

@@ -6,7 +6,7 @@ from typing import Any
 
 from dem_warp import Drum
 from doe import ProfileSample, scatter_of_views
-from doe.curves.profiles import LEAST_PROFILES
+from doe.curves.profile_sample import LEAST_PROFILES
 from doe.errors import RuleError
 from experiments.io.errors import InputError
 from experiments.measurement.plausible import size_of_test

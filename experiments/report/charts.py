@@ -9,7 +9,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from doe import ScreenResult
-from doe.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
+from doe.plots.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
 from doe.plots.plot_data import half_normal_points, pareto_points
 from experiments.calibrate.cases import measured
 from experiments.calibrate.results import ClimbResult, NoiseFloorResult, TargetResult, VerificationResult

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 
 from doe import JointFit
-from doe.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, SKY
+from doe.plots.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, SKY
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
 from experiments.report.kit.chart import Chart, add_bars, new_figure
 from experiments.report.surfaces import REGION_FILL, Slice, add_design, add_level, add_region, add_settings

@@ -12,7 +12,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from doe import Design, Region, Surface
-from doe.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
+from doe.plots.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from doe.plots.plot_data import SurfaceGrid, normal_points, surface_grid
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
 from experiments.report.kit.chart import LANDSCAPE, Chart, add_line, add_points, add_target, new_figure

@@ -23,7 +23,7 @@ from experiments.report.pictures import HeapPicture
 from experiments.report.solid import SolidHeap
 from experiments.studyfile import Study
 
-LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "scikit-learn", "opencv-python-headless")
+LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "opencv-python-headless")
 """Packages whose version may change a number."""
 
 PAGE = "report.html"

@@ -69,9 +69,9 @@ def test_the_covariance_of_equal_and_independent_places_keeps_its_size() -> None
 @pytest.mark.parametrize(
     ("profiles", "message"),
     [
-        (np.zeros((2, 9)), r"profiles: are rows, 3 or more, got shape \(2, 9\)\)"),
+        (np.zeros((2, 9)), r"profiles: are rows, 3 or more, got shape \(2, 9\)"),
         (np.zeros(9), r"profiles: are rows, 3 or more"),
-        (np.ones((4, 9)), r"profiles: must scatter, got the same one each time\)"),
+        (np.ones((4, 9)), r"profiles: must scatter, got the same one each time"),
         (np.vstack([np.ones((3, 2)), [[1.0, np.nan]]]), r"profiles\[3\]: must be finite"),
     ],
 )
@@ -184,7 +184,7 @@ def test_the_scatter_of_views_needs_two_profiles_with_several() -> None:
 @pytest.mark.parametrize(
     ("slopes", "message"),
     [
-        (np.ones((8, 2)), r"slopes: are finite, a row for each of 9 places, got shape \(8, 2\)\)"),
+        (np.ones((8, 2)), r"slopes: are finite, a row for each of 9 places, got shape \(8, 2\)"),
         (np.full((9, 2), np.nan), r"slopes: are finite"),
         (np.zeros((9, 2)), r"slopes: must move the profiles"),
     ],

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from doe.checks import checked_count, checked_kind
+from doe.arguments import checked_count, checked_kind
 from doe.design.design import Design
-from doe.design.terms import Term, term_name
+from doe.design.polynomial_terms import Term, term_name
 from doe.errors import DesignError
 
 ROMAN = {3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII"}

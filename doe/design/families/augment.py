@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from doe.checks import MOST, checked_count, checked_kind, checked_list, checked_number
+from doe.arguments import MOST, checked_count, checked_kind, checked_list, checked_number
 from doe.design.design import Design, numbered
 from doe.design.factors import Category, numeric_factors
 from doe.errors import DesignError

@@ -6,7 +6,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.checks import checked_count
+from doe.arguments import checked_count
 from doe.errors import DesignError
 
 SMALL = 1e-9

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from doe.checks import MOST, checked_count, checked_flag
+from doe.arguments import MOST, checked_count, checked_flag
 from doe.design.design import Design, numbered
 from doe.design.factors import Factor, numeric_factors
 from doe.design.families.factorial import basic_factorial

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from doe.checks import MOST, checked_count, checked_flag, checked_number
+from doe.arguments import MOST, checked_count, checked_flag, checked_number
 from doe.design.design import Design, numbered
 from doe.design.factors import Factor, numeric_factors
 from doe.design.families.blocking import block_labels

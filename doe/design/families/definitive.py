@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from doe.checks import MOST, checked_count
+from doe.arguments import MOST, checked_count
 from doe.design.design import Design, numbered
 from doe.design.factors import Factor, numeric_factors
 from doe.design.families.hadamard import conference_matrix, has_conference

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from doe.checks import MOST, checked_count, checked_list
+from doe.arguments import MOST, checked_count, checked_list
 from doe.design.design import Design, numbered
 from doe.design.factors import Category, Factor, checked_factors, two_level_factors
 from doe.design.families.aliases import alias_structure
 from doe.design.families.blocking import block_labels
-from doe.design.terms import term_name
+from doe.design.polynomial_terms import term_name
 from doe.errors import DesignError
 
 CATALOGUE: dict[int, dict[int, tuple[int, ...]]] = {

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from doe.checks import (
+from doe.arguments import (
     MOST,
     checked_count,
     checked_flag,

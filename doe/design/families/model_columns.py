@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from doe.checks import checked_choice
+from doe.arguments import checked_choice
 from doe.design.factors import Category, Factor
-from doe.design.terms import MODELS
+from doe.design.polynomial_terms import MODELS
 
 Columns = dict[str, np.ndarray]
 

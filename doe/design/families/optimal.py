@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from doe.checks import MOST, checked_choice, checked_count, checked_kind, checked_list, checked_seed
+from doe.arguments import MOST, checked_choice, checked_count, checked_kind, checked_list, checked_seed
 from doe.design.anova import block_columns
 from doe.design.design import Design, numbered
 from doe.design.factors import Category, Factor, checked_factors

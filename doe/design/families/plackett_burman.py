@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from doe.checks import checked_count
+from doe.arguments import checked_count
 from doe.design.design import Design, numbered
 from doe.design.factors import Factor, two_level_factors
 from doe.design.families.hadamard import constructible, screening_matrix, worst_alias

@@ -8,7 +8,14 @@ import pandas as pd
 from scipy import stats
 from scipy.stats import qmc
 
-from doe.checks import checked_count, checked_kind, checked_level, checked_list, checked_number, checked_seed
+from doe.arguments import (
+    checked_count,
+    checked_kind,
+    checked_level,
+    checked_list,
+    checked_number,
+    checked_seed,
+)
 from doe.design.anova import block_columns
 from doe.design.design import Design
 from doe.design.factors import Category

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
-from doe.checks import MOST, checked_choice, checked_count, checked_seed
+from doe.arguments import MOST, checked_choice, checked_count, checked_seed
 from doe.design.design import Design, numbered
 from doe.design.factors import Factor, numeric_factors
 from doe.errors import DesignError

@@ -11,8 +11,8 @@ from scipy import stats
 from scipy.linalg import orth
 
 from doe.discrepancy.contest.signatures import Signatures, projector, unshared
-from doe.discrepancy.fitting.fit import Fitted, fit
-from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.fitting.fitted_model import Stack
+from doe.discrepancy.fitting.model_fit import Fitted, fit
 
 
 class Question(StrEnum):

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.discrepancy.fitting.evidence import Block
-from doe.discrepancy.fitting.fit import Fitted, Interval, whiten
-from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.fitting.fitted_model import Stack
+from doe.discrepancy.fitting.measured_means import Block
+from doe.discrepancy.fitting.model_fit import Fitted, Interval, whiten
 
 
 @dataclass(frozen=True, eq=False)

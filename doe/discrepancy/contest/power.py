@@ -10,8 +10,8 @@ from scipy import stats
 from scipy.interpolate import interp1d
 
 from doe.discrepancy.contest.signatures import LEAST_LENGTH, Signatures, projector, secants
-from doe.discrepancy.emulation.surfaces import added
-from doe.discrepancy.fitting.fit import Fitted, minimise
+from doe.discrepancy.emulation.condition_surfaces import added
+from doe.discrepancy.fitting.model_fit import Fitted, minimise
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.space import SearchSpace
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import stats
 
 from doe.discrepancy.contest.signatures import projector
-from doe.discrepancy.fitting.fit import Fitted
+from doe.discrepancy.fitting.model_fit import Fitted
 
 CHANCE = 1.645
 """Standard deviations that a normal number passes upwards in one case of twenty."""

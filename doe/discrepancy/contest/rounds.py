@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from doe.discrepancy.contest.laboratory import Laboratory, Request
-from doe.discrepancy.fitting.fit import Fitted, fit
+from doe.discrepancy.contest.fresh_runs import Laboratory, Request
+from doe.discrepancy.fitting.fitted_model import Stack
 from doe.discrepancy.fitting.misses import Runs
-from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.fitting.model_fit import Fitted, fit
 from doe.discrepancy.fitting.refinement import correct, has_moved, points_around
+from doe.discrepancy.problem.outcomes import Outcomes, Point
 from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.simulator import Outcomes, Point
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from doe.discrepancy.fitting.evidence import Block
-from doe.discrepancy.fitting.fit import Fitted
-from doe.discrepancy.fitting.model import Model
+from doe.discrepancy.fitting.fitted_model import Model
+from doe.discrepancy.fitting.measured_means import Block
+from doe.discrepancy.fitting.model_fit import Fitted
 
 SECANT = 0.5
 """Coded size at which a signature is taken: an effect a unit of size."""

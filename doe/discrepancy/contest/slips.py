@@ -14,10 +14,10 @@ from itertools import combinations
 import numpy as np
 
 from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import Fitted, fit, glimpse
-from doe.discrepancy.fitting.model import Model, Stack
-from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import gather
+from doe.discrepancy.fitting.model_fit import Fitted, fit, glimpse
+from doe.discrepancy.problem.replicates import Measured
 from doe.discrepancy.problem.settings import Settings
 
 GROSS = 3.0

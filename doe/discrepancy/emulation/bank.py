@@ -21,8 +21,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from doe.discrepancy.emulation.kriged_parts import KrigedParts
+from doe.discrepancy.problem.outcomes import Outcomes, Point
 from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.simulator import Outcomes, Point
 from doe.discrepancy.problem.space import MechanismRange, SearchSpace
 from doe.errors import RuleError
 

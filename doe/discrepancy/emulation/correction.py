@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.discrepancy.emulation.kriging import squared_exponential
-from doe.discrepancy.emulation.surfaces import all_terms
+from doe.discrepancy.emulation.condition_surfaces import all_terms
+from doe.numerics.kriging import squared_exponential
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from doe.discrepancy.emulation.bank import Bank
+from doe.discrepancy.emulation.condition_surfaces import Addition, Surfaces
 from doe.discrepancy.emulation.kriged_parts import BASE, KrigedParts
-from doe.discrepancy.emulation.noise import fit_noises
+from doe.discrepancy.emulation.run_noise import fit_noises
 from doe.discrepancy.emulation.surface_fits import (
     AddedRuns,
     BaseRuns,
@@ -17,11 +18,10 @@ from doe.discrepancy.emulation.surface_fits import (
     fit_bases,
     repeats_of,
 )
-from doe.discrepancy.emulation.surfaces import Addition, Surfaces
 from doe.discrepancy.emulation.symmetry import symmetric_addition, symmetric_base
 from doe.discrepancy.problem.space import SearchSpace
-from doe.discrepancy.threads import in_one_thread
 from doe.errors import RuleError
+from doe.numerics.one_thread import in_one_thread
 
 LEAST_RUNS = 10
 """Of a mechanism, in every condition."""

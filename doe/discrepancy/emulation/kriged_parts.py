@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.discrepancy.emulation.kriging import Covariance, Kriging, fit_kriging, krige
 from doe.errors import RuleError
+from doe.numerics.kriging import Covariance, Kriging, fit_kriging, krige
 
 BETTER = 0.97
 """Kriging is kept where it lowers the mean square of what is left out to less than this."""

@@ -13,17 +13,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special, stats
 
+from doe.discrepancy.emulation.condition_surfaces import (
+    Addition,
+    Polynomial,
+    Surfaces,
+    added,
+    cubic,
+    quadratic,
+)
 from doe.discrepancy.emulation.kriged_parts import Rest
-from doe.discrepancy.emulation.kriging import Covariance
-from doe.discrepancy.emulation.noise import (
+from doe.discrepancy.emulation.run_noise import (
     ALIKE,
     Noise,
     correlation_of,
     fit_growth,
     repeat_deviations,
 )
-from doe.discrepancy.emulation.surfaces import Addition, Polynomial, Surfaces, added, cubic, quadratic
 from doe.errors import RuleError
+from doe.numerics.kriging import Covariance
 
 FAILURE_LEVEL = 0.005
 """A polynomial fails if leave-one-out errors as large as its own have this probability under noise alone."""

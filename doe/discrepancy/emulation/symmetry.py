@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from doe.discrepancy.emulation.surfaces import Addition, Surfaces
+from doe.discrepancy.emulation.condition_surfaces import Addition, Surfaces
 
 
 def symmetric_base(base: Surfaces, odd: np.ndarray) -> Surfaces:

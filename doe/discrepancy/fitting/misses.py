@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.discrepancy.emulation.correction import Prior, log_likelihood
-from doe.discrepancy.fitting.fit import whiten
-from doe.discrepancy.fitting.model import STEP, Model, Shift
+from doe.discrepancy.fitting.fitted_model import STEP, Model, Shift
+from doe.discrepancy.fitting.model_fit import whiten
 
 LENGTH = 0.7
 """Length over which the smooth function changes, in half ranges: what the emulator's terms leave over."""

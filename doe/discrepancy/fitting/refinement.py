@@ -15,10 +15,10 @@ from scipy import stats
 
 from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.emulation.correction import condition_on
-from doe.discrepancy.emulation.noise import repeat_deviations
-from doe.discrepancy.fitting.fit import Fitted
+from doe.discrepancy.emulation.run_noise import repeat_deviations
+from doe.discrepancy.fitting.fitted_model import Model
 from doe.discrepancy.fitting.misses import AMPLITUDES, Runs, beside_the_bank, likeliest_shift, misses
-from doe.discrepancy.fitting.model import Model
+from doe.discrepancy.fitting.model_fit import Fitted
 
 NOISE_WEIGHT = 20.0
 """Weight of the bank's noise beside the scatter of fresh repeats, in repeats."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.replicates import Measured
 
 
 @dataclass(frozen=True, eq=False)

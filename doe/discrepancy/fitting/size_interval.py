@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from doe.discrepancy.fitting.fit import Fitted, minimise
+from doe.discrepancy.fitting.model_fit import Fitted, minimise
 
 PROFILE_POINTS = 61
 

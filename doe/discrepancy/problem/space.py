@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from doe.discrepancy.problem.simulator import Point
+from doe.discrepancy.problem.outcomes import Point
 from doe.errors import RuleError
 
 CODED_DIGITS = 9

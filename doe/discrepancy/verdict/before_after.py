@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from doe.discrepancy.fitting.evidence import Block
-from doe.discrepancy.fitting.fit import Fitted, Interval, whiten
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import Block
 from doe.discrepancy.fitting.misses import Runs
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.model_fit import Fitted, Interval, whiten
 
 COVERAGE = 0.9
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from doe.discrepancy.contest.gap import Answer, GapTest, Question
 from doe.discrepancy.contest.rivals import certain, is_open, lag, parting
-from doe.discrepancy.fitting.fit import Fitted, Interval
+from doe.discrepancy.fitting.model_fit import Fitted, Interval
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.before_after import BeforeAfter
 from doe.discrepancy.verdict.discovery import Verdict

@@ -14,7 +14,7 @@ import numpy as np
 from doe.discrepancy.contest.gap import Answer
 from doe.discrepancy.contest.power import Power
 from doe.discrepancy.contest.slips import Slip
-from doe.discrepancy.fitting.fit import Interval
+from doe.discrepancy.fitting.model_fit import Interval
 from doe.discrepancy.verdict.before_after import BeforeAfter
 from doe.discrepancy.verdict.next_experiment import NextExperiment
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.discrepancy.contest.signatures import projector
-from doe.discrepancy.fitting.evidence import Block
-from doe.discrepancy.fitting.fit import Fitted, whiten
-from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.fitting.fitted_model import Stack
+from doe.discrepancy.fitting.measured_means import Block
+from doe.discrepancy.fitting.model_fit import Fitted, whiten
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ from doe.discrepancy.contest.gap import GapTest, condition_fits, drift_p, holm
 from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import Signatures, projector
 from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.fitting.evidence import Block, Evidence, scale_numbers
-from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, weigh
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import Block, Evidence, scale_numbers
+from doe.discrepancy.fitting.model_fit import AT_BOUND, Fitted, Interval, weigh
 from doe.discrepancy.fitting.size_interval import coded_size_interval
-from doe.discrepancy.problem.measured import Calibration
+from doe.discrepancy.problem.replicates import Calibration
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.conclusion import Assessment, objections
 from doe.discrepancy.verdict.discovery import CalibrationUse, Candidate, Data, Drift, Fit

@@ -8,13 +8,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from doe.checks import checked_flag, checked_kind, checked_level, real_array
+from doe.arguments import checked_flag, checked_kind, checked_level, real_array
 from doe.design.points import natural_points
-from doe.design.terms import term_name
+from doe.design.polynomial_terms import term_name
 from doe.errors import DesignError
-from doe.response.optimum import StationaryPoint
 from doe.response.quadratic import QuadraticForm
-from doe.response.surface import Surface
+from doe.response.response_surface import Surface
+from doe.response.surface_points import StationaryPoint
 
 FAR = 2.0
 """Coded distance beyond which a stationary point says nothing about the runs: they reach 1 to 2."""

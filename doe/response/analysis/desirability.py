@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from scipy import optimize
 from scipy.stats import qmc
 
-from doe.checks import checked_flag, checked_kind, checked_list, checked_map, checked_number, checked_seed
+from doe.arguments import checked_flag, checked_kind, checked_list, checked_map, checked_number, checked_seed
 from doe.design.design import Design
 from doe.design.families.optimal import Constraint, allowed
 from doe.design.points import natural_points
 from doe.errors import DesignError
-from doe.response.surface import Surface
+from doe.response.response_surface import Surface
 
 STARTS = 6
 """Best points of the search grid from which the optimum is refined."""

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 from scipy import optimize, stats
 
-from doe.checks import checked_kind, checked_level
+from doe.arguments import checked_kind, checked_level
 from doe.design.anova import settings_of
 from doe.design.coefficients import coefficient_table
 from doe.errors import DesignError
-from doe.response.surface import Surface
+from doe.response.response_surface import Surface
 
 LAMBDAS = (-2.0, 2.0)
 """Powers that are searched, as in R's ``boxcox``."""

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from statsmodels.regression.linear_model import RegressionResults
 from statsmodels.stats.anova import anova_lm
 
-from doe.checks import checked_choice, checked_flag, checked_kind, checked_level, checked_map, real_array
+from doe.arguments import checked_choice, checked_flag, checked_kind, checked_level, checked_map, real_array
 from doe.design.coefficients import coefficient_table, significant_words, summary_text
 from doe.design.design import Design, observations
 from doe.design.families.mixture import Mixture

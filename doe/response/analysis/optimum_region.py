@@ -3,10 +3,10 @@
 import numpy as np
 from scipy import stats
 
-from doe.checks import checked_kind, checked_level
-from doe.design.terms import Term
+from doe.arguments import checked_kind, checked_level
+from doe.design.polynomial_terms import Term
 from doe.response.region import Region, box_cells
-from doe.response.surface import Surface
+from doe.response.response_surface import Surface
 
 
 def stationary_region(

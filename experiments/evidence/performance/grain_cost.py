@@ -24,7 +24,7 @@ from dem_warp.device import resolve_device
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.solver import Solver
 from dem_warp.walls import Cylinder, Plane
-from doe.palette import BLUE, GRID, VERMILION
+from doe.plots.palette import BLUE, GRID, VERMILION
 from experiments.commands.options import OneDevice
 from experiments.evidence.machine import machine
 from experiments.evidence.performance.columns import CLUMP, reference_case

@@ -15,9 +15,9 @@ from doe.discrepancy import Calibration, Emulator, MechanismRange, Settings
 from doe.discrepancy.contest.power import Effects, detectable_coded_size
 from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.emulation.bank import sobol_points
-from doe.discrepancy.fitting.evidence import Block
-from doe.discrepancy.fitting.fit import weigh
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import Block
+from doe.discrepancy.fitting.model_fit import weigh
 from experiments.evidence.trials.drawing import Declared, Plan
 from experiments.io.errors import InputError
 from experiments.io.files import write_text

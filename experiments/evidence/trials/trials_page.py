@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from doe.palette import BLUE, MUTED, VERMILION
+from doe.plots.palette import BLUE, MUTED, VERMILION
 from experiments.evidence.trials.declaration import Declaration
 from experiments.evidence.trials.drawing import STRONG
 from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.ticker import NullLocator
 
-from doe.palette import SERIES
+from doe.plots.palette import SERIES
 from experiments.evidence.verification.result import Plot, Result, Row
 from experiments.io.files import write_text
 from experiments.report.kit.figure import new_axes, save_figure

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from doe.discrepancy import Confounding, Discovery, Fit
-from doe.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
+from doe.plots.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
 from experiments.report.discovery.tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
 from experiments.report.kit.chart import Chart, add_bars, add_points, new_figure

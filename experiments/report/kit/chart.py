@@ -7,7 +7,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from doe.palette import GREEN, GRID, INK, MUTED
+from doe.plots.palette import GREEN, GRID, INK, MUTED
 
 LANDSCAPE = "YlGnBu_r"
 """Colour scale of a response: even steps of lightness, also in grey print."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from doe.palette import GRID
+from doe.plots.palette import GRID
 from experiments.io.files import replacing
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from doe import palette
+from doe.plots import palette
 
 LIGHT: Mapping[str, str] = MappingProxyType(
     {

@@ -11,9 +11,9 @@ import pytest
 from synthetic import emulator, measure
 
 from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
-from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import fit, whiten
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import gather
+from doe.discrepancy.fitting.model_fit import fit, whiten
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.conclusion import closest_first, open_pairs
 

@@ -9,22 +9,13 @@ from typing import Never
 import numpy as np
 import pytest
 from scipy import stats
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, measure, space
 
 from doe.discrepancy import Bank, Outcomes, bank_points, fit_emulator, fitted, load_bank, make_bank
 from doe.discrepancy.emulation import kriged_parts
+from doe.discrepancy.emulation.condition_surfaces import added
 from doe.discrepancy.emulation.kriged_parts import KrigedParts
-from doe.discrepancy.emulation.kriging import (
-    AMPLITUDE_RANGE,
-    LENGTH_RANGE,
-    START_LENGTH,
-    Covariance,
-    fit_kriging,
-    krige,
-)
-from doe.discrepancy.emulation.noise import ALIKE, fit_noise
+from doe.discrepancy.emulation.run_noise import ALIKE, fit_noise
 from doe.discrepancy.emulation.surface_fits import (
     AddedRuns,
     BaseRuns,
@@ -32,11 +23,15 @@ from doe.discrepancy.emulation.surface_fits import (
     fit_bases,
     likeliest_scales,
 )
-from doe.discrepancy.emulation.surfaces import added
-from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import fit, whiten
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import gather
+from doe.discrepancy.fitting.model_fit import fit, whiten
 from doe.errors import RuleError
+from doe.numerics.kriging import (
+    Covariance,
+    fit_kriging,
+    krige,
+)
 
 
 def test_points_are_the_same_whenever_asked_and_every_case_has_its_own_seed() -> None:
@@ -210,21 +205,6 @@ def test_fitted_lengths_tell_a_flat_direction_from_a_steep_one() -> None:
         points, np.sin(4.0 * points[:, 0]) + 0.01 * rng.standard_normal(80), np.full(80, 1e-4)
     )
     assert fitted.covariance.length[1] > 3.0 * fitted.covariance.length[0]
-
-
-@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")  # of an end of a range
-@pytest.mark.parametrize("seed", range(4))
-def test_the_fitted_lengths_are_as_likely_as_those_that_scikit_learn_finds(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    points, noise = rng.uniform(-1.0, 1.0, (120, 3)), rng.uniform(0.05, 0.2, 120)
-    values = np.sin(3.0 * points[:, 0]) * points[:, 1] + np.sqrt(noise) * rng.standard_normal(120)
-    scale = np.sqrt(np.mean(values**2))
-    kernel = ConstantKernel(0.5, AMPLITUDE_RANGE) * RBF(np.full(3, START_LENGTH), LENGTH_RANGE)
-    process = GaussianProcessRegressor(kernel, alpha=noise / scale**2).fit(points, values / scale)
-    found = fit_kriging(points, values, noise).covariance
-    likelihood = process.log_marginal_likelihood(np.log([found.amplitude / scale**2, *found.length]))
-    # both stop where a step gains less than a millionth or so of the likelihood
-    assert likelihood > process.log_marginal_likelihood_value_ - 1e-3
 
 
 def _with_failures(failed: np.ndarray) -> Bank:

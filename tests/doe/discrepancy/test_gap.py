@@ -24,9 +24,9 @@ from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, drift_p, fi
 from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.power import CODED_SIZES, Effects, powers
 from doe.discrepancy.contest.signatures import projector, secants, signatures
-from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import Fitted, fit, weigh
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import gather
+from doe.discrepancy.fitting.model_fit import Fitted, fit, weigh
 from doe.discrepancy.fitting.size_interval import coded_size_interval
 
 NULLS = 100

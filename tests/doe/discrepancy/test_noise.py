@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.discrepancy.emulation.noise import (
+from doe.discrepancy.emulation.condition_surfaces import cubic
+from doe.discrepancy.emulation.run_noise import (
     ALIKE,
     fit_noise,
     fit_noises,
@@ -16,7 +17,6 @@ from doe.discrepancy.emulation.noise import (
     shared_correlations,
 )
 from doe.discrepancy.emulation.surface_fits import BaseRuns, fit_bases, shared_misfits
-from doe.discrepancy.emulation.surfaces import cubic
 
 FLOOR = np.full(6, 1e-9)
 

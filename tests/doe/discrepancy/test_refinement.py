@@ -10,12 +10,12 @@ from scipy import stats
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure, space
 
 from doe.discrepancy import bank_points, fit_emulator, make_bank
+from doe.discrepancy.emulation.condition_surfaces import all_terms
 from doe.discrepancy.emulation.correction import Prior, condition_on
-from doe.discrepancy.emulation.surfaces import all_terms
-from doe.discrepancy.fitting.evidence import Block, gather
-from doe.discrepancy.fitting.fit import fit, weigh
+from doe.discrepancy.fitting.fitted_model import Model, Shift, Stack
+from doe.discrepancy.fitting.measured_means import Block, gather
 from doe.discrepancy.fitting.misses import Runs, likeliest_shift, misses
-from doe.discrepancy.fitting.model import Model, Shift, Stack
+from doe.discrepancy.fitting.model_fit import fit, weigh
 from doe.discrepancy.fitting.refinement import correct
 from doe.discrepancy.fitting.size_interval import coded_size_interval
 

@@ -10,13 +10,13 @@ import pytest
 from synthetic import CONDITIONS, OBSERVABLES, SyntheticSimulator, measure, space
 
 from doe.discrepancy import Emulator, Settings, bank_points, fit_emulator, make_bank
-from doe.discrepancy.contest.laboratory import Laboratory
+from doe.discrepancy.contest.fresh_runs import Laboratory
 from doe.discrepancy.contest.power import CODED_SIZES, Effects, shown_apart
 from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
 from doe.discrepancy.contest.signatures import signatures
-from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import fit, weigh
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import gather
+from doe.discrepancy.fitting.model_fit import fit, weigh
 
 SMALL = Settings(
     bank_points=24,

@@ -30,9 +30,9 @@ from doe.discrepancy.contest.gap import OF_THE_BASE, find_gap
 from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.emulation.bank import sobol_points
-from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import fit, weigh
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import gather
+from doe.discrepancy.fitting.model_fit import fit, weigh
 from doe.discrepancy.fitting.size_interval import coded_size_interval
 from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
 from doe.discrepancy.verdict.records import calibration_uses

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from doe import palette
+from doe.plots import palette
 from experiments.report.kit.theme import DARK, DARK_CHARTS, LIGHT
 
 

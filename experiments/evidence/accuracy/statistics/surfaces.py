@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, special, stats
 
 from doe import Design, Factor, Goal, Sample, central_composite, fit_surface, joint_fit
-from doe.response.joint import PULL
+from doe.response.joint_fit import PULL
 from doe.response.quadratic import QuadraticForm
 from doe.samples.simultaneous import Simultaneous
 from doe.samples.two_errors import TwoErrors

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from doe.palette import BLUE, INK, MUTED, VERMILION
+from doe.plots.palette import BLUE, INK, MUTED, VERMILION
 from experiments.evidence.studies.cellulose.campaign import CURVES, FACTS, PREDICTION
 from experiments.evidence.studies.cellulose.fit import (
     LEVEL,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from doe.palette import BLUE, INK, VERMILION
+from doe.plots.palette import BLUE, INK, VERMILION
 from experiments.evidence.studies.drum_commands import require_run
 from experiments.evidence.studies.wheat_drums.campaign import DRUMS, FACTS, HEAPS
 from experiments.evidence.studies.wheat_drums.fit import LEVEL, Slopes, WheatFit, fit_slopes

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from doe.palette import GRID, SERIES
+from doe.plots.palette import GRID, SERIES
 from experiments.evidence.trials.baselines.compare import (
     Parts,
     alarm_scores,

@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from doe.discrepancy import Emulator, Measured, Settings
-from doe.discrepancy.fitting.evidence import Block, Evidence, gather
-from doe.discrepancy.fitting.fit import Fitted, fit
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import Block, Evidence, gather
+from doe.discrepancy.fitting.model_fit import Fitted, fit
 from experiments.io.errors import InputError
 
 LEVEL = 0.025

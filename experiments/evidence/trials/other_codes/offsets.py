@@ -20,7 +20,7 @@ import pandas as pd
 import typer
 
 from doe.discrepancy import Measured, fit_emulator
-from doe.discrepancy.fitting.model import Model
+from doe.discrepancy.fitting.fitted_model import Model
 from experiments.commands.console import clear_errors
 from experiments.discover.search import Search
 from experiments.evidence.trials.declaration import read_declaration

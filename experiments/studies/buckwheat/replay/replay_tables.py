@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from doe.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
+from doe.plots.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from experiments.report.kit.chart import Chart, add_line, add_points, new_figure
 from experiments.report.kit.numbers import estimate, fixed, p_clause
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table

@@ -26,11 +26,11 @@ from doe.discrepancy import (
     Settings,
     analyse,
 )
-from doe.discrepancy.emulation.noise import Noise
-from doe.discrepancy.emulation.surfaces import Addition, Polynomial, Surfaces, added, cubic
-from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import minimise, whiten
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.emulation.condition_surfaces import Addition, Polynomial, Surfaces, added, cubic
+from doe.discrepancy.emulation.run_noise import Noise
+from doe.discrepancy.fitting.fitted_model import Model, Stack
+from doe.discrepancy.fitting.measured_means import gather
+from doe.discrepancy.fitting.model_fit import minimise, whiten
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.evidence.studies.buckwheat.sensitivity.variants import BASE, variants
 from experiments.studies.buckwheat import paper

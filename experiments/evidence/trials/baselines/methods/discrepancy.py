@@ -18,8 +18,8 @@ from itertools import product
 import numpy as np
 from scipy.special import logsumexp
 
-from doe.discrepancy.fitting.fit import Fitted, minimise, whiten
-from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.fitting.fitted_model import Stack
+from doe.discrepancy.fitting.model_fit import Fitted, minimise, whiten
 from experiments.evidence.trials.baselines.protocol import ODDS, Answer, Problem
 
 SIGMAS = tuple(2.0 ** np.arange(-3.0, 3.1, 0.5))

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import logsumexp
 
-from doe.discrepancy.fitting.fit import Fitted, weigh
+from doe.discrepancy.fitting.model_fit import Fitted, weigh
 
 PARTICLES = 256
 MOVES = 4

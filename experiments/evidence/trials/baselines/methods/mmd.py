@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.fitting.fitted_model import Stack
 from experiments.evidence.trials.baselines.protocol import LEVEL, Answer, Problem
 
 DRAWS = 200

@@ -12,7 +12,7 @@ from scipy import stats
 from scipy.special import logsumexp
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, emulator, measure
 
-from doe.discrepancy.fitting.fit import weigh
+from doe.discrepancy.fitting.model_fit import weigh
 from doe.errors import RuleError
 from experiments.evidence.trials.baselines.library import ALONE, installed, methods
 from experiments.evidence.trials.baselines.methods import discrepancy, inference

@@ -10,10 +10,10 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag
 
+from doe.discrepancy.emulation.condition_surfaces import all_terms
 from doe.discrepancy.emulation.correction import Correction
 from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.emulation.surfaces import all_terms
-from doe.discrepancy.fitting.evidence import Block
+from doe.discrepancy.fitting.measured_means import Block
 from doe.discrepancy.fitting.scatter import Excess, Scatter
 
 STEP = 0.02

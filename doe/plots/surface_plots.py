@@ -11,13 +11,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from doe.checks import checked_kind, checked_number
+from doe.arguments import checked_kind, checked_number
 from doe.design.design import checked_setting
-from doe.palette import BLUE, MUTED, VERMILION
+from doe.plots.palette import BLUE, MUTED, VERMILION
 from doe.plots.plot_data import normal_points, surface_grid
 from doe.plots.style import WIDTH, canvas, key, plain
 from doe.response.region import Region
-from doe.response.surface import Surface
+from doe.response.response_surface import Surface
 
 
 def residual_plots(surface: Surface, axes: tuple[Axes, Axes] | None = None) -> Figure:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
-from doe.checks import (
+from doe.arguments import (
     checked_choice,
     checked_flag,
     checked_kind,
@@ -24,7 +24,7 @@ from doe.design.coefficients import anova_by_order, coefficient_table, significa
 from doe.design.design import Design, observations
 from doe.design.factors import Category, two_level_factors
 from doe.design.points import coded_points
-from doe.design.terms import (
+from doe.design.polynomial_terms import (
     INTERCEPT,
     Term,
     contains,
@@ -37,7 +37,7 @@ from doe.design.terms import (
     term_name,
 )
 from doe.errors import DesignError
-from doe.response import contour, optimum, region
+from doe.response import contour, region, surface_points
 from doe.response.quadratic import QuadraticForm
 from doe.samples.sample import Sample
 
@@ -340,12 +340,12 @@ class Surface:
         return contour.contour(self, target, extent, resolution)
 
     def nearest(self, target: float, to: Mapping[str, float] | None = None, extent: float = 1.0) -> pd.Series:
-        """Return the contour's point nearest to the design center, natural (see ``doe.response.optimum.nearest``)."""
-        return optimum.nearest(self, target, to, extent)
+        """Return the contour's point nearest to the design center, natural (see ``doe.response.surface_points.nearest``)."""
+        return surface_points.nearest(self, target, to, extent)
 
-    def stationary_point(self) -> optimum.StationaryPoint:
-        """Return where the gradient vanishes, and its kind (see ``doe.response.optimum.stationary_point``)."""
-        return optimum.stationary_point(self)
+    def stationary_point(self) -> surface_points.StationaryPoint:
+        """Return where the gradient vanishes, and its kind (see ``doe.response.surface_points.stationary_point``)."""
+        return surface_points.stationary_point(self)
 
     def compatible_region(
         self,

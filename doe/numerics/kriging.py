@@ -19,6 +19,10 @@ START_AMPLITUDE, START_LENGTH = 0.5, 0.6
 """Start of the search: from longer lengths it may end where nothing is smooth."""
 AMPLITUDE_RANGE = (1e-3, 1e2)
 """Amplitudes that a fit may find, in units of the variance of the data."""
+NOISY_RANGES = (1e-2, 1e2), (0.4, 8.0), (1e-4, 2.0)
+"""Amplitudes, lengths and variances of the noise that a fit with unknown noise may find."""
+NOISY_STARTS = (0.7, 1.0, 0.2), (10.0, 2.0, 0.02)
+"""Amplitude, length and noise that it starts from, the noise large or small: the likelihood has two humps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +89,7 @@ def krige(points: np.ndarray, values: np.ndarray, noise: np.ndarray, covariance:
 
 
 def fit_kriging(points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Kriging:
-    """Find amplitude and lengths of largest marginal likelihood, then condition on the data.
-
-    Parameters
-    ----------
-    points : (n, parameters) array
-    values, noise : (n,) array
-    """
+    """Find amplitude and lengths of largest marginal likelihood for known variances of the noise, all (n,)."""
     scale = float(np.sqrt(np.mean(values**2)))
     start = np.log([START_AMPLITUDE, *[START_LENGTH] * points.shape[1]])
     bounds = np.log([AMPLITUDE_RANGE, *[LENGTH_RANGE] * points.shape[1]])
@@ -100,8 +98,22 @@ def fit_kriging(points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Kr
     return krige(points, values, noise, Covariance(float(found[0]) * scale**2, found[1:]))
 
 
+def fit_noisy_kriging(points: np.ndarray, values: np.ndarray) -> tuple[Kriging, float]:
+    """Find amplitude, lengths and one variance of the noise of largest likelihood; return that variance too."""
+    scale, size = float(np.sqrt(np.mean(values**2))) or 1.0, points.shape[1]
+    amplitudes, lengths, noises = NOISY_RANGES
+    bounds = np.log([amplitudes, *[lengths] * size, noises])
+    starts = (np.log([amplitude, *[length] * size, noise]) for amplitude, length, noise in NOISY_STARTS)
+    data = (points, values / scale, None)
+    fits = [minimize(_loss, start, data, method="L-BFGS-B", jac=True, bounds=bounds) for start in starts]
+    found = np.exp(min(fits, key=lambda one: float(one.fun)).x)
+    noise = float(found[-1]) * scale**2
+    covariance = Covariance(float(found[0]) * scale**2, found[1:-1])
+    return krige(points, values, np.full(len(points), noise), covariance), noise
+
+
 def _loss(
-    logarithms: np.ndarray, points: np.ndarray, values: np.ndarray, noise: np.ndarray
+    logarithms: np.ndarray, points: np.ndarray, values: np.ndarray, noise: np.ndarray | None
 ) -> tuple[float, np.ndarray]:
     """Compute minus the log marginal likelihood but for a constant, and its slopes (ibid., equation 5.9).
 
@@ -110,19 +122,20 @@ def _loss(
 
     Parameters
     ----------
-    logarithms : (1 + parameters,) array
-        Of the amplitude and the lengths.
-    points : (n, parameters) array
-    values, noise : (n,) array
+    logarithms
+        Those of the amplitude, of each length and, where the noise is unknown (None), of its variance.
     """
-    amplitude, scaled = np.exp(logarithms[0]), points / np.exp(logarithms[1:])
+    size = points.shape[1]
+    amplitude, scaled = np.exp(logarithms[0]), points / np.exp(logarithms[1 : 1 + size])
+    variances = np.full(len(points), np.exp(logarithms[-1])) if noise is None else noise
     smooth = amplitude * squared_exponential(scaled, scaled)
-    factor = cho_factor(smooth + np.diag(noise), lower=True, overwrite_a=True, check_finite=False)
+    factor = cho_factor(smooth + np.diag(variances), lower=True, overwrite_a=True, check_finite=False)
     weights = cho_solve(factor, values, check_finite=False)
     inverse, _ = dpotri(factor[0], lower=1)  # its lower triangle: each pair of runs once
     pull = np.tril(smooth * (np.outer(weights, weights) - inverse))
     pull[np.diag_indices_from(pull)] *= 0.5
     of_each = pull.sum(axis=0) + pull.sum(axis=1)
     by_length = of_each @ scaled**2 - 2.0 * (scaled * (pull @ scaled)).sum(axis=0)
+    by_noise = [] if noise is not None else [0.5 * variances[0] * (weights @ weights - np.trace(inverse))]
     loss = 0.5 * values @ weights + np.log(np.diag(factor[0])).sum()
-    return float(loss), -np.append(pull.sum(), by_length)
+    return float(loss), -np.concatenate([[pull.sum()], by_length, by_noise])

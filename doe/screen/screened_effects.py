@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
-from doe.checks import checked_choice, checked_flag, checked_kind, checked_level
+from doe.arguments import checked_choice, checked_flag, checked_kind, checked_level
 from doe.design.anova import (
     ErrorTerm,
     anova_table,
@@ -21,7 +21,14 @@ from doe.design.anova import (
 )
 from doe.design.coefficients import summary_text
 from doe.design.design import Design, observations
-from doe.design.terms import Term, find_term, model_matrix, model_terms, natural_coefficients, term_name
+from doe.design.polynomial_terms import (
+    Term,
+    find_term,
+    model_matrix,
+    model_terms,
+    natural_coefficients,
+    term_name,
+)
 from doe.errors import DesignError
 from doe.samples.lenth import LENTH_DRAWS, SEED, orthogonal_null, pseudo_error
 

@@ -7,12 +7,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from doe.checks import checked_kind, checked_list
+from doe.arguments import checked_kind, checked_list
 from doe.errors import DesignError
-from doe.palette import BLUE, MUTED, ORANGE
+from doe.plots.palette import BLUE, MUTED, ORANGE
 from doe.plots.plot_data import half_normal_points, pareto_points
 from doe.plots.style import canvas, key, plain
-from doe.screen.screening import ScreenResult
+from doe.screen.screened_effects import ScreenResult
 from doe.screen.two_level_effects import TwoLevelEffects
 
 

@@ -7,15 +7,14 @@ and what kriging does not know are the emulator's own covariance.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from doe.discrepancy.threads import in_one_thread
 from doe.errors import RuleError
+from doe.numerics.kriging import Kriging, fit_noisy_kriging
+from doe.numerics.one_thread import in_one_thread
 
 Array = NDArray[np.float64]
 
@@ -41,8 +40,8 @@ class CurveEmulator:
     """Constant and slopes of each score, shape (components, 1 + settings)."""
     trend_error: Array
     """Covariance of constant and slopes for a noise of 1, shape (1 + settings, 1 + settings)."""
-    processes: tuple[Any, ...]
-    """Rest of each score that the trend misses, a process of scikit-learn each."""
+    processes: tuple[Kriging, ...]
+    """Part of each score that the trend misses."""
     noises: Array
     """Variance of the noise of one run in each score, shape (components,)."""
     remainder: Array
@@ -82,7 +81,7 @@ class CurveEmulator:
         left = rows - mean - scores @ components
         basis = _with_constant(x)
         trends = np.linalg.lstsq(basis, scores, rcond=None)[0].T
-        fitted = [_process(x, miss) for miss in (scores - basis @ trends.T).T]
+        fitted = [fit_noisy_kriging(x, miss) for miss in (scores - basis @ trends.T).T]
         return cls(
             mean,
             components,
@@ -105,9 +104,8 @@ class CurveEmulator:
         means = basis @ self.trends.T
         variances = np.einsum("ij,jk,ik->i", basis, self.trend_error, basis)[:, None] * self.noises
         for number, process in enumerate(self.processes):
-            miss, deviation = process.predict(x, return_std=True)
-            means[:, number] += miss
-            variances[:, number] += deviation**2
+            means[:, number] += process.mean(x)
+            variances[:, number] += process.variance(x)
         return means, variances
 
     def predict(self, settings: ArrayLike) -> tuple[Array, Array]:
@@ -128,25 +126,3 @@ class CurveEmulator:
 
 def _with_constant(x: Array) -> Array:
     return np.column_stack([np.ones(len(x)), x])
-
-
-def _process(x: Array, values: Array) -> tuple[Any, float]:
-    """Krige values whose noise is found with the rest; the process predicts without the noise."""
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-
-    scale = float(np.sqrt(np.mean(values**2))) or 1.0
-    smooth = ConstantKernel(0.7, (1e-2, 1e2)) * RBF(np.full(x.shape[1], 1.0), (0.4, 8.0))
-    process = GaussianProcessRegressor(
-        smooth + WhiteKernel(0.2, (1e-4, 2.0)), n_restarts_optimizer=1, random_state=0
-    )
-    with warnings.catch_warnings():
-        # An amplitude or a length at the end of its range is an answer, not a failure.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        process.fit(x, values / scale)
-    noise = float(process.kernel_.k2.noise_level)
-    known = GaussianProcessRegressor(
-        ConstantKernel(scale**2, "fixed") * process.kernel_.k1, alpha=noise * scale**2, optimizer=None
-    )
-    return known.fit(x, values), noise * scale**2

@@ -9,7 +9,7 @@ import numpy as np
 
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.scatter import NOTHING, Excess, Scatter
-from doe.discrepancy.problem.measured import Calibration, Measured
+from doe.discrepancy.problem.replicates import Calibration, Measured
 
 
 @dataclass(frozen=True, eq=False)

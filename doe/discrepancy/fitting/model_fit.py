@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from doe.discrepancy.emulation.bank import sobol_points
-from doe.discrepancy.fitting.model import STEP, Model, Stack
+from doe.discrepancy.fitting.fitted_model import STEP, Model, Stack
 
 ITERATIONS = 40
 SCOUTING = 6

@@ -8,14 +8,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from doe.checks import checked_map, checked_number
+from doe.arguments import checked_map, checked_number
 from doe.design.design import checked_setting
 from doe.errors import DesignError
-from doe.palette import BLUE, GREEN, MUTED, ORANGE, VERMILION
+from doe.plots.palette import BLUE, GREEN, MUTED, ORANGE, VERMILION
 from doe.plots.plot_data import surface_grid
 from doe.plots.style import canvas, key
 from doe.response.analysis.desirability import checked_surfaces
-from doe.response.surface import Surface
+from doe.response.response_surface import Surface
 
 COLORS = (BLUE, VERMILION, GREEN, ORANGE, MUTED)
 

@@ -7,14 +7,14 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from doe.checks import checked_kind, checked_list, checked_map
+from doe.arguments import checked_kind, checked_list, checked_map
 from doe.design.design import Design, checked_setting, observations
 from doe.design.factors import Category, Factor
 from doe.errors import DesignError
-from doe.palette import BLUE, MUTED, ORANGE, VERMILION
+from doe.plots.palette import BLUE, MUTED, ORANGE, VERMILION
 from doe.plots.style import WIDTH, canvas, plain
 from doe.response.analysis.desirability import Wish, checked_surfaces
-from doe.response.surface import Surface
+from doe.response.response_surface import Surface
 
 DASHES = ("-", "--", ":", "-.")
 GAP = 0.6

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from doe.checks import checked_count, checked_level, checked_number
+from doe.arguments import checked_count, checked_level, checked_number
 from doe.errors import DesignError
 from doe.samples.sample import Sample
 

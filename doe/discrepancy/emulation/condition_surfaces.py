@@ -13,8 +13,8 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from doe.discrepancy.emulation.kriging import Kriging
-from doe.discrepancy.emulation.noise import Noise
+from doe.discrepancy.emulation.run_noise import Noise
+from doe.numerics.kriging import Kriging
 
 
 @cache

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from doe.checks import checked_choice, checked_level, checked_number
+from doe.arguments import checked_choice, checked_level, checked_number
 from doe.errors import DesignError
 from doe.samples.sample import Sample, Values
 from doe.samples.two_errors import TwoErrors

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from doe.checks import checked_list, real_array
+from doe.arguments import checked_list, real_array
 from doe.errors import RuleError
+from doe.numerics.shrunk_covariance import shrunk_covariance
 from doe.samples.sample import Sample
 
 LEAST_PROFILES = 3
@@ -76,8 +77,6 @@ class ProfileSample:
         ----------
         O. Ledoit and M. Wolf, Journal of Multivariate Analysis 88 (2004) 365-411.
         """
-        from sklearn.covariance import ledoit_wolf
-
         rows = np.array(profiles, dtype=np.float64)
         if rows.ndim != 2 or len(rows) < LEAST_PROFILES:
             raise RuleError("profiles", f"are rows, {LEAST_PROFILES} or more", f"shape {rows.shape}")
@@ -92,8 +91,8 @@ class ProfileSample:
         root = np.eye(rows.shape[1]) if views is None else _root(views, rows.shape[1])
         rounded = np.linalg.solve(root, away.T).T
         scale = rounded.std()
-        covariance, shrinkage = ledoit_wolf(rounded / scale, assume_centered=True)
-        return cls(mean, root @ covariance @ root.T * scale**2, count, float(shrinkage), rows)
+        covariance, shrinkage = shrunk_covariance(rounded / scale)
+        return cls(mean, root @ covariance @ root.T * scale**2, count, shrinkage, rows)
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -173,8 +172,6 @@ def scatter_of_views(heaps: Sequence[ArrayLike]) -> NDArray[np.float64] | None:
     DesignError
         When views are no finite numbers, or at other places than those of the first profile.
     """
-    from sklearn.covariance import ledoit_wolf
-
     profiles = [real_array("views of a profile", views) for views in checked_list("profiles", heaps)]
     for views in profiles:
         if views.ndim != 2 or views.shape[1:] != profiles[0].shape[1:] or not np.isfinite(views).all():
@@ -188,7 +185,7 @@ def scatter_of_views(heaps: Sequence[ArrayLike]) -> NDArray[np.float64] | None:
     scale = float(away.std())
     if not scale > 0.0:
         return None
-    return np.asarray(ledoit_wolf(away / scale, assume_centered=True)[0] * scale**2)
+    return np.asarray(shrunk_covariance(away / scale)[0] * scale**2)
 
 
 def _root(covariance: ArrayLike, places: int) -> NDArray[np.float64]:

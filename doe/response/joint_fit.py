@@ -10,12 +10,12 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize
 
-from doe.checks import checked_count, checked_level, checked_map, checked_number
+from doe.arguments import checked_count, checked_level, checked_map, checked_number
 from doe.design.factors import Factor
 from doe.errors import DesignError
 from doe.response.fitted import FittedSurface, unselected
 from doe.response.region import Region, box_cells, misfit
-from doe.response.surface import Surface
+from doe.response.response_surface import Surface
 from doe.samples.sample import Sample
 from doe.samples.simultaneous import Simultaneous
 from doe.samples.two_errors import TwoErrors

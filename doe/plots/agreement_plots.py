@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from doe.checks import checked_kind, checked_list, checked_number
+from doe.arguments import checked_kind, checked_list, checked_number
 from doe.errors import DesignError
-from doe.palette import BLUE, GREEN, MUTED, ORANGE, VERMILION
+from doe.plots.palette import BLUE, GREEN, MUTED, ORANGE, VERMILION
 from doe.plots.style import canvas, plain
 from doe.samples.agreement import Agreement
 from doe.screen.steepest import ClimbPath, climb_table

@@ -9,7 +9,7 @@ import numpy as np
 
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.misses import Runs
-from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy.problem.outcomes import Outcomes, Point
 from doe.errors import RuleError
 
 DIGITS = 4

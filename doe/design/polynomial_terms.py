@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from doe.checks import checked_choice, checked_count, checked_list
+from doe.arguments import checked_choice, checked_count, checked_list
 from doe.design.factors import Factor
 from doe.errors import DesignError
 

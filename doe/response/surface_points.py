@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize
 
-from doe.checks import checked_map, checked_number
+from doe.arguments import checked_map, checked_number
 from doe.design.points import natural_points
 from doe.errors import DesignError, TargetError
 from doe.response.contour import contour_points

@@ -1,0 +1,1 @@
+"""Numerical tools that several folders share: kriging, a shrunk covariance, one thread of linear algebra."""
