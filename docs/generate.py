@@ -17,7 +17,7 @@ from typer.main import get_command
 
 from dem_warp import SCENES
 from experiments.cli import app
-from experiments.discover.library import FILES
+from experiments.discover.mechanism_files import FILES
 from experiments.evidence.robustness.cluster import plan
 from experiments.studyfile.observables import OBSERVABLES, OUTLINE
 from experiments.studyfile.reference import study_reference

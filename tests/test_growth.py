@@ -77,7 +77,7 @@ PROGRAM = """
 import json, pathlib
 from experiments.calibrate.screening import screening_design
 from experiments.cli import app
-from experiments.discover.library import library_for
+from experiments.discover.mechanism_files import library_for
 from experiments.export import EXPORTERS
 from experiments.grains.spheres import read_clump
 from experiments.studyfile import load_study

@@ -13,8 +13,6 @@ from experiments.io.units import Quantity
 from experiments.studyfile import Study, load_card
 from experiments.studyfile.card import BRIDGE
 from experiments.studyfile.card_surface import SURFACE, card_surfaces
-from experiments.studyfile.places import drop
-from experiments.studyfile.solver_section import CORRECTED_FOR
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,16 +74,10 @@ def _target(facts: dict[str, Any], place: str) -> tuple[Sample, str]:
 
 def _with_factors(study: Study, card: dict[str, Any], surface: Surface) -> Study:
     """Free the factors of a surface in a card's study."""
-    document, factors = study.document, []
-    drop(document, ["solver", CORRECTED_FOR])  # a bridge begins anew, wherever some values came from
+    factors = []
     for factor in surface.design.factors:
-        told = card["factor"][factor.name]
-        parameters = [name.strip() for name in told["parameter"].split(",")]
-        for parameter in parameters:
-            drop(document, parameter.split("."))
-        low, high = (
-            str(Quantity(end, factor.unit)) if factor.unit else end for end in (factor.low, factor.high)
-        )
-        row = {"name": factor.name, "label": factor.name, "parameter": parameters, "low": low, "high": high}
-        factors.append(row)
-    return study.with_document(document | {"factor": factors})
+        parameters = [name.strip() for name in card["factor"][factor.name]["parameter"].split(",")]
+        ends = {name: Quantity(getattr(factor, name), factor.unit) for name in ("low", "high")}
+        factors.append({"name": factor.name, "label": factor.name, "parameter": parameters, **ends})
+    # a bridge begins anew, whichever solver some values were corrected for
+    return study.with_factors(factors, solver=study.solver.model_copy(update={"corrected_for": None}))

@@ -28,12 +28,13 @@ from doe.discrepancy import (
 from experiments.cases import engine_of
 from experiments.cases.engines.key import engine_identity
 from experiments.cases.store.manifest import describe
-from experiments.discover.library import FORMER_NAMES, Mechanism, library_for, with_maximum
 from experiments.discover.maker import notes_on
+from experiments.discover.mechanism_files import FORMER_NAMES, library_for, with_maximum
 from experiments.discover.mirror import odd_observables
 from experiments.io.errors import InputError, StudyError
 from experiments.io.texts import nearest_name
 from experiments.studyfile import Study
+from experiments.studyfile.mechanism_factor import MechanismFactor
 
 WITHOUT_EFFECT = (
     "name", "note", "companion", "target", "response", "campaign", "discover", "factor", "engine",
@@ -46,7 +47,7 @@ class Search:
     """Mechanisms that are looked for, and the rules; settled before the data are opened."""
 
     study: Study
-    library: tuple[Mechanism, ...]
+    library: tuple[MechanismFactor, ...]
     settings: Settings
 
     @classmethod
@@ -156,7 +157,7 @@ def _up_to_date(bank: Bank, space: SearchSpace) -> Bank:
     return replace(bank, space=replace(bank.space, mechanisms=mechanisms, odd=odd))
 
 
-def _wanted(study: Study) -> tuple[Mechanism, ...]:
+def _wanted(study: Study) -> tuple[MechanismFactor, ...]:
     library = {mechanism.name: mechanism for mechanism in library_for(study)}
     if not library:
         raise StudyError(str(study.file), "a search needs a mechanism that the study can have", "none")

@@ -71,6 +71,11 @@ class Quantity:
     def __str__(self) -> str:
         return f"{self.number!r} {self.unit}".rstrip()
 
+    @property
+    def written(self) -> float | str:
+        """Number or text that `parse` reads as the same quantity."""
+        return str(self) if self.unit else self.number
+
     def to_base(self, dimension: str) -> float:
         """Convert to SI (degrees for angles); ``dimension`` ``""`` takes plain numbers only.
 

@@ -9,11 +9,13 @@ from doe import ProfileSample, scatter_of_views
 from doe.curves.profile_sample import LEAST_PROFILES
 from doe.errors import RuleError
 from experiments.io.errors import InputError
+from experiments.io.units import Quantity
 from experiments.measurement.plausible import size_of_test
 from experiments.measurement.profile_files import Profiles, read_drum_profiles, read_heap_profiles
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import OUTLINE_PROFILE, PROFILES, SURFACE_PROFILE
+from experiments.studyfile.target_section import ResponseSection, TargetSection
 
 OWN = ("note", "twin")
 """Keys of ``[target]`` that no ``[[response]]`` has."""
@@ -30,24 +32,19 @@ def with_profiles(study: Study) -> Study:
     InputError
         When a file cannot be read or breaks a rule, or the test does not show the profile.
     """
-    document = study.document
-    tables = {"target": [document["target"]] if "target" in document else []}
-    tables["response"] = list(document.get("response", []))
-    named = {table.get("observable") for found in tables.values() for table in found} & set(PROFILES)
-    if not named and not any("profiles" in table for found in tables.values() for table in found):
+    target, file = study.target_section, study.file
+    sections = {f"{file}: response[{n}]": each for n, each in enumerate(study.response_sections, 1)}
+    sections = ({f"{file}: target": target} if target else {}) | sections
+    named = {section.observable for section in sections.values()} & set(PROFILES)
+    if not named and all(section.profiles is None for section in sections.values()):
         return study
-    first, *others = [
-        made
-        for key, found in tables.items()
-        for number, table in enumerate(found)
-        for made in _made(study, table, f"{study.file}: {key}" + f"[{number + 1}]" * (key == "response"))
-    ]
-    # what belongs to the section itself, and to no other response
-    first |= {key: document["target"][key] for key in OWN if key in document.get("target", {})}
-    left = {key: value for key, value in document.items() if key not in tables}
-    if OUTLINE_PROFILE in named:
-        left["measurement"] = left.get("measurement", {}) | {"outline": True}
-    return study.with_document(left | {"target": first} | ({"response": others} if others else {}))
+    first, *others = [made for place, section in sections.items() for made in _made(study, section, place)]
+    own = {key: getattr(target, key) for key in OWN if target and key in target.model_fields_set}
+    given = {
+        key: getattr(first, key) for key in ResponseSection.model_fields if key in first.model_fields_set
+    }
+    outline = study.measurement.model_copy(update={"outline": True}) if OUTLINE_PROFILE in named else None
+    return study.with_responses(TargetSection(**given, **own), others, outline)
 
 
 def counted_twice(study: Study) -> tuple[str, ...]:
@@ -63,18 +60,18 @@ def counted_twice(study: Study) -> tuple[str, ...]:
     )
 
 
-def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any]]:
-    """Responses that a table stands for: itself, or those of its profiles."""
-    profile, twin = table.get("observable"), study.target_section is not None and study.target_section.twin
+def _made(study: Study, section: ResponseSection, place: str) -> list[ResponseSection]:
+    """Return the responses that a section is for: itself, or those of its profiles."""
+    profile, twin = section.observable, study.target_section is not None and study.target_section.twin
     if profile not in PROFILES:
-        if "profiles" not in table:
-            return [table]
+        if section.profiles is None:
+            return [section]
         known = " or ".join(f'"{name}"' for name in PROFILES)
         raise InputError(place, f"expected profiles are of the observable {known}", profile)
-    if "profiles" not in table and not twin:
+    if section.profiles is None and not twin:
         raise InputError(place, f'"{profile}" needs profiles, a file of them, or a twin', "neither")
-    name = table.get("scene", TARGET_SCENE)
-    shared = {key: table[key] for key in ("scene",) if key in table}
+    name = section.scene
+    shared = {"scene": name} if "scene" in section.model_fields_set else {}
     shared["part_of"] = f"{profile}_{name}".replace("-", "_") if name != TARGET_SCENE else profile
     scene = study.case({}, 0, name).scene
     if (profile == SURFACE_PROFILE) != isinstance(scene, Drum) or not (
@@ -83,8 +80,8 @@ def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any
         rule = 'expected profiles are those of a drum, a "surface", or of a heap, an "outline"'
         raise InputError(place, rule, f"{profile} of {scene.name}")
     if twin:
-        return [shared | {"observable": height} for height in PROFILES[profile]]
-    path = study.file.parent / table["profiles"]
+        return [ResponseSection(**shared, observable=height) for height in PROFILES[profile]]
+    path = study.file.parent / str(section.profiles)
     if isinstance(scene, Drum):
         found = read_drum_profiles(path, scene.diameter / 2)
     else:
@@ -96,20 +93,21 @@ def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any
         sample = ProfileSample.of(found.heights, scatter_of_views(found.views))
     except RuleError as error:
         raise InputError(str(path), f"expected profiles {error.problem}", error.value) from None
-    return [shared | mode for mode in _modes(sample, found, profile, shared["part_of"])]
+    modes = _modes(sample, found, profile, shared["part_of"])
+    return [ResponseSection(**shared, **mode) for mode in modes]
 
 
 def _modes(sample: ProfileSample, found: Profiles, profile: str, title: str) -> list[dict[str, Any]]:
-    """Tables of the independent directions of profiles."""
+    """Return the values of the sections of the independent directions of profiles."""
     names = [PROFILES[profile][station] for station in found.stations]
     return [
         {
             "observable": f"{title}_mode_{number}",
             "weights": dict(zip(names, map(float, mode.weights), strict=True)),
-            "mean": f"{mode.target.mean!r} m",
-            "sd": f"{mode.target.sd!r} m",
+            "mean": Quantity(mode.target.mean, "m"),
+            "sd": Quantity(mode.target.sd, "m"),
             "n": mode.target.n,
-            "measurements": (found.heights @ mode.weights).tolist(),
+            "measurements": tuple((found.heights @ mode.weights).tolist()),
         }
         for number, mode in enumerate(sample.modes, 1)
     ]

@@ -11,6 +11,7 @@ import numpy as np
 
 from doe import Sample
 from experiments.io.errors import InputError
+from experiments.io.units import Quantity
 from experiments.measurement.copies import require_separate
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.pictures import find_pictures, measure_pictures, require_same_fit
@@ -18,6 +19,7 @@ from experiments.measurement.profiles import counted_twice, with_profiles
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import ANGLE, BY_NAME
+from experiments.studyfile.target_section import ResponseSection, TargetSection
 
 
 @dataclass(frozen=True)
@@ -131,13 +133,13 @@ def find_pictured(study: Study) -> list[Path]:
     return paths
 
 
-def target_tables(
-    study: Study, measured: Iterable[Replicated], asked: Replicated | None = None
-) -> dict[str, Any]:
-    """Write measurements as ``[target]`` and ``[[response]]`` tables; none where none can take part in a fit.
+def target_sections(
+    study: Study, measured: Iterable[Replicated], note: str = "", asked: Replicated | None = None
+) -> tuple[TargetSection | None, tuple[ResponseSection, ...]]:
+    """Turn measurements into a ``[target]`` and ``[[response]]``s; None where none can take part in a fit.
 
-    What is asked for leads; else the angle of the first condition that takes part in the fit, or else its
-    first observable.
+    The one that is asked for leads; else the angle of the first condition that takes part in the fit, or else
+    its first observable.
     """
     held_out = _held_out(study)
     order = [TARGET_SCENE, *(condition.name for condition in study.conditions)]
@@ -151,31 +153,31 @@ def target_tables(
         ),
     )
     if not ranked or ranked[0].condition in held_out:
-        return {}
-    first, *others = [_table(study, one) for one in ranked]
-    return {"target": first} | ({"response": others} if others else {})
+        return None, ()
+    first, *others = [_values(study, one) for one in ranked]
+    noted = {"note": note} if note else {}
+    return TargetSection(**first, **noted), tuple(ResponseSection(**each) for each in others)
 
 
 def _given(study: Study, measured: list[Replicated], note: str, asked: Replicated | None = None) -> Study:
     """Put measurements in place of where they come from; the responses of the study stay."""
-    document = study.document
-    tables = target_tables(study, measured, asked)
-    if not tables:
+    target, responses = target_sections(study, measured, note, asked)
+    if target is None:
         rule = "needs an observable with two values or more under a condition that is not held out"
         raise InputError(f"{study.file}: target", rule, note)
-    responses = [*tables.get("response", []), *document.get("response", [])]
-    document |= {"target": tables["target"] | {"note": note}}
-    return study.with_document(document | ({"response": responses} if responses else {}))
+    return study.with_responses(target, (*responses, *study.response_sections))
 
 
-def _table(study: Study, one: Replicated) -> dict[str, Any]:
-    """Write one as the table of a response: numbers that read back as the same floats."""
+def _values(study: Study, one: Replicated) -> dict[str, Any]:
+    """Return the values of the section that one is matched by."""
     units = {name: each.unit for each in study.measurable for name in (each.name, each.column)}
     unit, column = units[one.observable], _column(one)
+    unit = "" if unit == "1" else unit
     numbers: dict[str, Any] = {
-        key: value if unit == "1" else f"{value!r} {unit}"
-        for key, value in (("mean", float(one.sample.mean)), ("sd", float(one.sample.sd)))
-    } | {"n": one.sample.n}
+        "mean": Quantity(float(one.sample.mean), unit),
+        "sd": Quantity(float(one.sample.sd), unit),
+        "n": one.sample.n,
+    }
     if _scene(study, one.condition) == TARGET_SCENE:
         return {"observable": column, **numbers}
     name = f"{column}_{one.condition}".replace("-", "_")

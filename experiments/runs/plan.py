@@ -20,7 +20,7 @@ from experiments.cases.forecast.cost import Cost, cost_of, device_bytes
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.workers.batches import rounds_of
 from experiments.cases.workers.speed import Speed, measure_speed, store_speed, stored_speed, wave_seconds
-from experiments.discover.engine import EngineSimulator
+from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.search import Search
 from experiments.io.errors import InputError, StudyError
 from experiments.report.companion import companion_of

@@ -18,7 +18,7 @@ from experiments.cases.store.folder import locked
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.store.outputs import publishing, sha256_of
 from experiments.cases.workers.own import THIS_MACHINE, watched_by
-from experiments.discover.engine import EngineSimulator
+from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.search import Search
 from experiments.io.errors import InputError

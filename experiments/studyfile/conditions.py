@@ -83,12 +83,13 @@ def under_condition(
     left_out = ("condition", "target", "response", "campaign")
     kept = {key: value for key, value in document.items() if key not in left_out}
     merged = merge(kept, condition.changes)
-    factors = []
-    for factor in merged.get("factor", []):
-        written = factor["parameter"]
-        places = [written] if isinstance(written, str) else written
-        if free := [place for place in places if value_at(condition.changes, place.split(".")) is None]:
-            factors.append(factor | {"parameter": free})
-    names = {factor["name"] for factor in merged.get("factor", [])}
-    fixed = names - {factor["name"] for factor in factors}
-    return merged | {"factor": factors}, frozenset(fixed)
+    factors = [free_of(condition, factor) for factor in merged.get("factor", [])]
+    fixed = frozenset(factor["name"] for factor in factors if not factor["parameter"])
+    return merged | {"factor": [factor for factor in factors if factor["parameter"]]}, fixed
+
+
+def free_of(condition: Condition, factor: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a ``[[factor]]`` with the places alone that a condition leaves open."""
+    written, changes = factor["parameter"], condition.changes
+    places = [written] if isinstance(written, str) else written
+    return {**factor, "parameter": [each for each in places if value_at(changes, each.split(".")) is None]}

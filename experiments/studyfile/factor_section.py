@@ -114,6 +114,17 @@ class FactorSection(Section):
             except ValueError as error:
                 raise StudyError(places.of(setter.path), str(error), value) from None
 
+    @property
+    def middle(self) -> Quantity:
+        """Middle of the range."""
+        return Quantity(self.factor().center, self.unit)
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """Section as a study file writes it."""
+        levels = {name: getattr(self, name).written for name in ("low", "high")}
+        return {"name": self.name, "label": self.label, "parameter": list(self.parameter), **levels}
+
     def factor(self) -> Factor:
         """Build the factor of the designs."""
         return Factor(self.name, self.low.number, self.natural(self.high), self.unit)
@@ -169,10 +180,11 @@ def with_factor_values(
     """
     written = dict(document)
     for section in sections:
-        value = settings.get(section.name, section.factor().center)
+        value = section.middle
+        if section.name in settings:
+            value = Quantity(settings[section.name], section.unit)
         for path in section.paths:
-            text = str(Quantity(value, section.unit)) if section.unit else value
-            written = merge(written, nested(path, text))
+            written = merge(written, nested(path, value.written))
     return written
 
 

@@ -184,9 +184,11 @@ def marks_of(field: FieldInfo) -> Iterator[Any]:
 
 
 def validated(
-    model: type[SectionT], document: Mapping[str, Any], places: Places, **context: object
+    model: type[SectionT], document: Mapping[str, Any], places: Places, at: KeyPath = (), **context: object
 ) -> SectionT:
-    """Validate the values of a section by key; ``context`` has further facts that validators want.
+    """Validate the values of a section by key, which is at a key path of the file.
+
+    Validators take the further facts of ``context``.
 
     Raises
     ------
@@ -196,8 +198,15 @@ def validated(
     try:
         return model.model_validate(document, context={"folder": places.folder, **context})
     except ValidationError as error:
-        problems = (_problem(model, document, places, *each) for each in _flat(error.errors()))
+        problems = (_problem(model, document, places, at, *each) for each in _flat(error.errors()))
         raise StudyError.of(problems) from None
+
+
+def first_problem(error: ValueError) -> str:
+    """Return the first rule that an error of a section is about."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    return message(next(_flat(error.errors()))[1])
 
 
 def nested_error(errors: Any) -> PydanticCustomError:
@@ -223,6 +232,7 @@ def _problem(
     model: type[BaseModel],
     document: Mapping[str, Any],
     places: Places,
+    at: KeyPath,
     path: KeyPath,
     details: Mapping[str, Any],
 ) -> Problem:
@@ -236,4 +246,4 @@ def _problem(
             rule = "is required"
         case _:
             rule = message(details)
-    return Problem(places.of(path), rule, "nothing" if value is None else repr(value))
+    return Problem(places.of((*at, *path)), rule, "nothing" if value is None else repr(value))

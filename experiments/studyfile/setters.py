@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any
 
 from pydantic import TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 
 from experiments.io.units import Quantity
 from experiments.studyfile.mechanisms import mechanisms_section
 from experiments.studyfile.scene_sections import scene_section
-from experiments.studyfile.schema import Dimension, Section, bounds, dimension_of, message, steps
+from experiments.studyfile.schema import (
+    Dimension,
+    Section,
+    SectionT,
+    bounds,
+    dimension_of,
+    fields_of,
+    first_problem,
+    section_of,
+    steps,
+)
 from experiments.studyfile.sections import Physics
 
 
@@ -41,7 +53,7 @@ class Setter:
         try:
             value = self.number.validate_python(quantity)
         except ValidationError as error:
-            raise ValueError(message(error.errors()[0])) from None
+            raise ValueError(first_problem(error)) from None
         *outer, last = self.attributes
         for attribute in outer:
             changes = changes.setdefault(attribute, {})
@@ -70,8 +82,13 @@ def _compiled(parameter: str, *libraries: type[Section]) -> Setter:
     dimension = dimension_of(field) if field else None
     if field is None or dimension is None:
         raise ValueError('must lead to a quantity of the study, as "contact.grain-grain.static_friction"')
+    return Setter(path, tuple(name for name, _ in trail), dimension, bounds(field), _reader(field))
+
+
+def _reader(field: FieldInfo) -> TypeAdapter[Any]:
+    """Build the reader of a field's values."""
     kind: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
-    return Setter(path, tuple(name for name, _ in trail), dimension, bounds(field), TypeAdapter(kind))
+    return TypeAdapter(kind)
 
 
 def changed(value: Any, change: Any) -> Any:
@@ -81,3 +98,31 @@ def changed(value: Any, change: Any) -> Any:
     old = value if isinstance(value, dict) else vars(value)
     new = {name: changed(old[name], each) for name, each in change.items()}
     return value | new if isinstance(value, dict) else value.model_copy(update=new)
+
+
+def revised(section: SectionT, change: Mapping[str, Any]) -> SectionT:
+    """Copy a section with values by key, nested as in a file; a section that is missing is made of them.
+
+    Raises
+    ------
+    ValueError
+        When there is no such key, or a value or the whole section breaks a rule.
+    """
+    known, update = fields_of(type(section)), {}
+    for key, value in change.items():
+        if key not in known:
+            raise ValueError(f"unknown key {key!r}")
+        attribute, field = known[key]
+        update[attribute] = _revised(getattr(section, attribute), field, value)
+    return type(section).model_validate(section.model_copy(update=update))
+
+
+def _revised(old: Any, field: FieldInfo, value: object) -> Any:
+    if not isinstance(value, Mapping):
+        return _reader(field).validate_python(value)
+    if isinstance(old, dict):
+        return old | {name: _revised(old.get(name), field, each) for name, each in value.items()}
+    kind = section_of(field)
+    if kind is not None and not isinstance(old, kind):  # missing, or of a library that has grown
+        return kind.model_validate({**getattr(old, "given", {}), **value})
+    return revised(old, value)

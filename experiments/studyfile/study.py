@@ -7,7 +7,7 @@ is a `StudyError` with the rule, the value received and the file, line and key. 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -23,7 +23,7 @@ from experiments.io.toml_files import read_toml
 from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
 from experiments.studyfile.card import card_document, with_material
 from experiments.studyfile.cluster_section import ClusterSection
-from experiments.studyfile.conditions import BASE, Condition, Conditions, under_condition
+from experiments.studyfile.conditions import BASE, Condition, Conditions, free_of, under_condition
 from experiments.studyfile.engine_section import EngineSection
 from experiments.studyfile.factor_section import (
     FactorSection,
@@ -34,12 +34,13 @@ from experiments.studyfile.factor_section import (
     with_factor_values,
 )
 from experiments.studyfile.observables import Observable, measurable
-from experiments.studyfile.places import KeyPath, Places
+from experiments.studyfile.places import KeyPath, Places, drop, nested, value_at
 from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import RawQuantity, Section, validated
-from experiments.studyfile.sections import Physics, Scene, GrainCountError
-from experiments.studyfile.setters import changed
+from experiments.studyfile.schema import RawQuantity, Section, first_problem, validated
+from experiments.studyfile.sections import GrainCountError, Physics, Scene
+from experiments.studyfile.setters import changed, revised
+from experiments.studyfile.solver_section import SolverSection
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
 from imaging import FITS
 
@@ -196,6 +197,8 @@ class Study(Physics):
         if condition not in known:
             rule = f"must be a condition of the study, {nearest_name(condition, list(known))}"
             raise StudyError(str(self.file), rule, condition)
+        if not known[condition].changes:
+            return self
         if condition not in self._under:
             document, fixed = under_condition(self._document, known[condition])
             study = _build(document, replace(self._places, condition=condition))
@@ -214,10 +217,131 @@ class Study(Physics):
         return _build(dict(document), self._places)
 
     def with_target(self, target: Target) -> Study:
-        """The same study, whose cases must match something else."""
+        """Return the same study, whose cases must match something else."""
         study = self.model_copy()
         study._target = target
         return study
+
+    def with_engine(self, engine: Mapping[str, Any]) -> Study:
+        """Return the same study, whose cases another engine simulates: an ``[engine]`` as written.
+
+        Raises
+        ------
+        StudyError
+            When the section breaks a rule.
+        """
+        section = validated(EngineSection, engine, self._places, ("engine",))
+        return self._changed(self.document | {"engine": dict(engine)}, engine=section)
+
+    def with_responses(
+        self,
+        target: TargetSection,
+        responses: Iterable[ResponseSection] = (),
+        measurement: MeasurementSection | None = None,
+    ) -> Study:
+        """Return the same study, whose cases must match other numbers, read in another way where it says so.
+
+        Raises
+        ------
+        StudyError
+            When two have one name, there is no such scene or observable, or a measurement is wrong.
+        """
+        sections, reading = tuple(responses), measurement or self.measurement
+        document = {key: value for key, value in self.document.items() if key not in ("target", "response")}
+        document["target"] = target.table
+        if target.twin is not None:
+            document["target"]["twin"] = self._document["target"]["twin"]
+        if sections:
+            document["response"] = [self._row(section) for section in sections]
+        if measurement is not None:
+            document["measurement"] = measurement.model_dump(exclude_unset=True)
+        study = self._changed(
+            document, target_section=target, response_sections=sections, measurement=reading
+        )
+        study._match()
+        return study
+
+    def _row(self, section: ResponseSection) -> dict[str, Any]:
+        """Return a ``[[response]]`` as the study file writes it, or as it would."""
+        own = zip(self.response_sections, self._document.get("response", []), strict=False)
+        return next((row for each, row in own if each is section), section.table)
+
+    def with_factors(
+        self,
+        tables: Sequence[Mapping[str, Any]],
+        settings: Mapping[str, float | str] | None = None,
+        solver: SolverSection | None = None,
+    ) -> Study:
+        """Return the same study with more factors, each in the place of the value that it varies.
+
+        Parameters
+        ----------
+        tables
+            The ``[[factor]]`` sections; a level is a number, a text or a quantity.
+        settings
+            Values by place, which hold where the study has none.
+        solver
+            Conventions of the contact law in place of the study's.
+
+        Raises
+        ------
+        StudyError
+            When the study cannot have the factors.
+        """
+        study = self._with_factors(tables, settings or {}, solver or self.solver)
+        for name, condition in self.condition_sections.items():
+            if condition.changes:
+                free = [free_of(condition, table) for table in tables]
+                found = self.under(name)._with_factors(
+                    [table for table in free if table["parameter"]], settings or {}, solver or self.solver
+                )
+                found._fixed |= {table["name"] for table in free if not table["parameter"]}
+                study._under[name] = found
+        study._check_names()
+        return study
+
+    def _with_factors(
+        self, tables: Sequence[Mapping[str, Any]], settings: Mapping[str, float | str], solver: SolverSection
+    ) -> Study:
+        rows = [*self.factor_sections, *tables]
+        sections = validated(FactorTable, {"factor": rows}, self._places).factor
+        added, document = sections[len(self.factor_sections) :], self.document
+        change: dict[str, Any] = {}
+        for path, value in ((path, section.middle) for section in added for path in section.paths):
+            drop(document, path)
+            change = merge(change, nested(path, value))
+        for path, value in ((place.split("."), value) for place, value in settings.items()):
+            if value_at(document, path) is None:
+                document, change = (merge(each, nested(path, value)) for each in (document, change))
+        document["factor"] = [*document.get("factor", []), *(section.table for section in added)]
+        try:
+            physics = revised(self._physics.model_copy(update={"solver": solver}), change)
+        except ValueError as error:
+            raise StudyError(str(self.file), first_problem(error)) from None
+        study = self._changed(document, **dict(physics), factor_sections=sections)
+        _check_restitution(study)
+        return study
+
+    def _changed(self, document: dict[str, Any], **fields: Any) -> Study:
+        """Copy the study with other sections and the document that has them."""
+        study = self.model_copy(update=fields)
+        for name in set(vars(study)) - set(Study.model_fields):
+            del vars(study)[name]  # properties of the study as it was
+        study._document, study._under = document, dict(self._under)
+        return study
+
+    def _check_names(self) -> None:
+        """Refuse factors named like a column of the results' tables."""
+        names = [section.name for section in self.factor_sections]
+        titles = [section.title for section in (self.target_section, *self.response_sections) if section]
+        check_factor_names(names, self._places, self.scenes.values(), titles)
+
+    def _match(self) -> None:
+        """Build the target."""
+        self._check_names()
+        held_out = [condition.name for condition in self.conditions if condition.held_out]
+        target, responses = self.target_section, self.response_sections
+        self._target = build_target(target, responses, self.scenes, held_out, self._places)
 
     def natural_settings(self, settings: Mapping[str, object], source: str = "settings") -> dict[str, float]:
         """Read factor values with their units, as ``{"B": "34 MPa", "E": 0.46}``, in natural units.
@@ -346,11 +470,7 @@ def _build(document: dict[str, Any], places: Places) -> Study:
                 f"expected a further scene has a name of its own: {name!r} is the study's own, or a condition"
             )
             raise StudyError(places.of(("response-scene", name)), rule, name)
-    held_out = [condition.name for condition in study.conditions if condition.held_out]
-    target, responses = study.target_section, study.response_sections
-    titles = [section.title for section in (*([target] if target else []), *responses)]
-    check_factor_names(names, places, study.scenes.values(), titles)
-    study._target = build_target(target, responses, study.scenes, held_out, places)
+    study._match()
     return study
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from pydantic import Field
 
 from doe import Sample
 from experiments.io.errors import StudyError
 from experiments.io.texts import nearest_name
+from experiments.io.units import Quantity
 from experiments.studyfile.campaign import MOST, TARGET_SCENE, FactorValues, Response, Target, Twin
 from experiments.studyfile.observables import ANGLE, DIMENSIONS, PROFILES, Observable, observables_of
 from experiments.studyfile.places import KeyPath, Places
@@ -62,6 +64,16 @@ class ResponseSection(Section):
     def title(self) -> str:
         """Its name."""
         return self.name or self.observable
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """Section as a study file writes it."""
+        given = {
+            name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set
+        }
+        return {
+            name: value.written if isinstance(value, Quantity) else value for name, value in given.items()
+        }
 
     def response(self, unit: str, measured: bool, path: KeyPath, places: Places) -> Response:
         """Build the response of the campaign; ``unit`` is that of its observable.

@@ -18,9 +18,10 @@ from dem_warp.laws.library import MECHANISMS
 from dem_warp.scenes.library import SCENES
 from experiments.calibrate.screening import DESIGNS
 from experiments.cases import ENGINES, Store
-from experiments.discover.library import library_for, with_mechanisms
+from experiments.discover.mechanism_files import library_for
 from experiments.export import EXPORTERS
 from experiments.studyfile import load_study
+from experiments.studyfile.mechanism_factor import with_mechanisms
 
 
 def approach(*mechanisms: object) -> float:

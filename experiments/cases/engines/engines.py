@@ -47,15 +47,15 @@ def with_engine(study: Study, name: str | None = None, command: str | None = Non
         )
     if name is not None and name not in ENGINES:
         raise InputError("engine", f"must be one of {', '.join(ENGINES) or 'none'}", name)
-    document = study.document
-    kept = {key: value for key, value in document.get("engine", {}).items() if key not in ("name", "command")}
+    own = study.document.get("engine", {})
+    kept = {key: value for key, value in own.items() if key not in ("name", "command")}
     if command is not None:
         words = command_program(command, Path.cwd(), "--command").words
         chosen = {"command": " ".join(map(quoted, words))}
     else:
         chosen = {"name": str(name)}
     given = {key: value for key, value in limits.items() if value is not None}
-    return study.with_document(document | {"engine": kept | chosen | given})
+    return study.with_engine(kept | chosen | given)
 
 
 def engine_of(study: Study) -> Engine | None:

@@ -20,7 +20,7 @@ from doe.discrepancy import Bank, Point, Simulator, bank_points
 from experiments.cases import Resources, open_workers
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.commands.console import clear_errors
-from experiments.discover.engine import EngineSimulator
+from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.maker import maker_of_today
 from experiments.discover.search import Search
 from experiments.evidence.trials.generate import STUDY

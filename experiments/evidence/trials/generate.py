@@ -28,9 +28,9 @@ from doe.discrepancy import Bank, Simulator, fit_emulator, fitted
 from experiments.cases import Resources, open_workers
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.commands.console import clear_errors
-from experiments.discover.engine import EngineSimulator
-from experiments.discover.library import library_for
+from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.maker import maker_of_today
+from experiments.discover.mechanism_files import library_for
 from experiments.discover.search import Search
 from experiments.evidence.trials.camera import stated_scales
 from experiments.evidence.trials.declaration import (

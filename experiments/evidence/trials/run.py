@@ -24,7 +24,7 @@ from doe.discrepancy import fit_emulator, load_bank
 from experiments.cases import Resources, open_workers
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.commands.console import clear_errors
-from experiments.discover.engine import EngineSimulator
+from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.search import Search
 from experiments.evidence.trials.cost import planned_cases
 from experiments.evidence.trials.declaration import read_declaration

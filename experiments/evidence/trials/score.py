@@ -12,7 +12,7 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from doe.discrepancy import Verdict
-from experiments.discover.library import FORMER_NAMES
+from experiments.discover.mechanism_files import FORMER_NAMES
 from experiments.evidence.trials.drawing import STRONG, Declared
 from experiments.evidence.trials.findings import CRASH
 from experiments.evidence.trials.roc import area_text

@@ -12,14 +12,14 @@ import numpy as np
 from doe import Sample
 from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
 from experiments.cases.store.manifest import study_hash
-from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.io.files import write_text
 from experiments.io.toml_files import toml_text
-from experiments.measurement.target import Replicated, target_tables
+from experiments.measurement.target import Replicated, target_sections
 from experiments.report.clump_files import gather_clumps
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import tied
 from experiments.studyfile import Study
+from experiments.studyfile.mechanism_factor import MechanismFactor, with_mechanisms
 
 HEAD = """\
 # Written by dem-warp discover: {name}, with {title} added as a factor that ranges over its 90 % interval.
@@ -55,7 +55,7 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
 
 
 def extended_document(
-    study: Study, added: Mapping[Mechanism, Interval], data: Data, heading: float | None = None
+    study: Study, added: Mapping[MechanismFactor, Interval], data: Data, heading: float | None = None
 ) -> dict[str, Any]:
     """Add mechanisms to a study's document, each as a factor that ranges over its interval.
 
@@ -64,12 +64,11 @@ def extended_document(
     counts along it is taken to there from its `heading` [deg], where the camera saw half of it or more.
     """
     ranges = {mechanism.name: _range(mechanism, size) for mechanism, size in added.items()}
-    document = with_mechanisms(study, list(added), ranges).document
+    extended = with_mechanisms(study, list(added), ranges)
     seen = {one.name: math.cos(math.radians((heading or 0.0) - one.camera)) for one in study.conditions}
     directed = [each.name for each in study.measurable if each.directed]
-    if tables := target_tables(study, _replicated(data, directed, seen)):
-        document = {key: value for key, value in document.items() if key != "response"} | tables
-    return document
+    target, responses = target_sections(study, _replicated(data, directed, seen))
+    return (extended.with_responses(target, responses) if target else extended).document
 
 
 def _standing(found: Discovery) -> list[tuple[list[tuple[str, Interval]], float | None]]:
@@ -80,7 +79,7 @@ def _standing(found: Discovery) -> list[tuple[list[tuple[str, Interval]], float 
     return [(list(zip(model.mechanisms, model.sizes, strict=True)), model.heading) for model in models]
 
 
-def _range(mechanism: Mechanism, size: Interval) -> tuple[float, float]:
+def _range(mechanism: MechanismFactor, size: Interval) -> tuple[float, float]:
     """The interval of a size within the mechanism's range, or the whole range where it holds nothing."""
     low, high = (float(f"{end:.{DIGITS}g}") for end in (size.low, size.high))
     low, high = max(low, mechanism.null), min(high, mechanism.maximum)

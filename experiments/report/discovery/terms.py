@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from doe.discrepancy import Interval
-from experiments.discover.library import Mechanism
 from experiments.report.kit.numbers import MISSING, enumeration, fixed, trimmed
 from experiments.studyfile.factor_section import FactorSection
+from experiments.studyfile.mechanism_factor import MechanismFactor
 from experiments.studyfile.observables import Observable
 
 SHOWN_UNITS = {"m": (1e3, "mm"), "deg": (1.0, "°"), "1": (1.0, "")}
@@ -27,13 +27,16 @@ SIZE_DIGITS = 3
 class Terms:
     """The vocabulary of a page."""
 
-    mechanisms: Mapping[str, Mechanism]
+    mechanisms: Mapping[str, MechanismFactor]
     observables: Mapping[str, Observable]
     factors: Mapping[str, FactorSection]
 
     @classmethod
     def of(
-        cls, library: Sequence[Mechanism], observables: Sequence[Observable], factors: Sequence[FactorSection]
+        cls,
+        library: Sequence[MechanismFactor],
+        observables: Sequence[Observable],
+        factors: Sequence[FactorSection],
     ) -> Terms:
         """Collect the vocabulary by name."""
         return cls(

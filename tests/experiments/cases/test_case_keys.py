@@ -12,8 +12,9 @@ import pytest
 
 from dem_warp import Case
 from experiments.cases.engines.key import described
-from experiments.discover.library import library_for, with_mechanisms
+from experiments.discover.mechanism_files import library_for
 from experiments.studyfile import BUCKWHEAT, Study, load_study, study_scales, write_template
+from experiments.studyfile.mechanism_factor import with_mechanisms
 
 KEYS = Path(__file__).with_name("case_keys.json")
 """Digests of `keys_of` by study and scale."""

@@ -14,7 +14,7 @@ from dem_warp import Drum, Interaction, WallPart
 from doe.discrepancy import Point
 from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.discover.engine import EngineSimulator
+from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.search import Search
 from experiments.export import ExportedTest
 from experiments.io.errors import InputError, StudyError

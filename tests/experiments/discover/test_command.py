@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from experiments.cases import OwnWorkers
 from experiments.cli import app
 from experiments.runs.campaign import check_runs
 from experiments.runs.search import OUTCOMES, Job, run_search
-from experiments.studyfile import load_study
+from experiments.studyfile import Study, load_study, study
+from experiments.studyfile.places import Places
 from experiments.studyfile.observables import PHOTOGRAPHED
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
@@ -59,6 +61,23 @@ def test_a_search_on_photographs_needs_what_they_show(tmp_path: Path) -> None:
         assert code == 2
         assert "measured.csv: a search on photographs only needs what they show: one of flank_angle" in err
         assert "got t75" in err
+
+
+def test_a_search_builds_its_study_and_each_condition_when_a_file_is_read_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built, build = [], study._build
+
+    def counted(document: dict[str, Any], places: Places) -> Study:
+        built.append(places)
+        return build(document, places)
+
+    monkeypatch.setattr(study, "_build", counted)
+    data = tmp_path / "measured.csv"
+    data.write_text("condition,replicate,observable,value,unit\nbase,1,t75,400,ms\n", encoding="utf-8")
+    code, said, err = discover(data, "--dry-run")
+    assert code == 0, err
+    assert 0 < len(built) <= 12
 
 
 def test_a_folder_in_use_is_never_written_to(tmp_path: Path) -> None:
@@ -109,9 +128,9 @@ def test_a_tilted_plate_is_found_on_the_real_engine(tmp_path: Path) -> None:
     # parameters. With half of them the noise of the runs is that of the heaps, and the bank's emulator misses
     # the radii of the fast and the wide heaps by several of its errors.
     few = {"refinement_points": 4, "refinement_rounds": 1, "shortlist": 1, "direct_runs": 4}
-    study = load_study(STUDY, "bench", {"discover": {"settings": few}})
+    trial = load_study(STUDY, "bench", {"discover": {"settings": few}})
     # In one process: new ones for each wave take a tenth of the time.
-    ended = run_search(Job(study, TRIAL / "tilted-bench.csv", tmp_path / "out", workers=OwnWorkers("cpu", 1)))
+    ended = run_search(Job(trial, TRIAL / "tilted-bench.csv", tmp_path / "out", workers=OwnWorkers("cpu", 1)))
     found = ended.discovery
     assert found is not None
     assert found.named == ("plate_tilt",)

@@ -14,8 +14,8 @@ from experiments.cases import OwnWorkers
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.workers import own
 from experiments.discover import wave
-from experiments.discover.engine import EngineSimulator
-from experiments.discover.library import library_for
+from experiments.discover.engine_simulator import EngineSimulator
+from experiments.discover.mechanism_files import library_for
 from experiments.io.errors import StoreError
 from experiments.measurement.states import measure
 from experiments.studyfile import Study, load_study

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from experiments.discover import library
-from experiments.discover.library import FILES, library_for, with_mechanisms
+from experiments.discover import mechanism_files
+from experiments.discover.mechanism_files import FILES, library_for
 from experiments.io.errors import StudyError
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.mechanism_factor import with_mechanisms
 
-TRIAL = Path(library.__file__).parents[1] / "studies" / "trial" / "study.toml"
+TRIAL = Path(mechanism_files.__file__).parents[1] / "studies" / "trial" / "study.toml"
 WriteStudy = Callable[..., Path]
 
 

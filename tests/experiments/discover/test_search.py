@@ -12,8 +12,8 @@ import pytest
 from doe.discrepancy import Measured, Outcomes, Point, Verdict, drive, load_bank
 from doe.errors import RuleError
 from experiments.discover.fresh_cases import cases_for
-from experiments.discover.library import FORMER_NAMES
 from experiments.discover.maker import maker_of_today
+from experiments.discover.mechanism_files import FORMER_NAMES
 from experiments.discover.search import Search
 from experiments.io.errors import InputError, StudyError
 from experiments.report.discovery import Terms, verdict_line, write_discovery

@@ -14,7 +14,7 @@ from experiments.cases import engine_of, with_engine
 from experiments.cases.engines import engines
 from experiments.cases.engines.key import case_key
 from experiments.cli import app
-from experiments.discover.library import library_for
+from experiments.discover.mechanism_files import library_for
 from experiments.discover.search import Search
 from experiments.io.errors import StudyError
 from experiments.report.study_facts import study_facts

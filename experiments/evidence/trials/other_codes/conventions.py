@@ -27,8 +27,8 @@ from doe.discrepancy import Point
 from experiments.cases import Resources, Workers, open_workers
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.commands.console import clear_errors
-from experiments.discover.engine import EngineSimulator
-from experiments.discover.library import library_for
+from experiments.discover.engine_simulator import EngineSimulator
+from experiments.discover.mechanism_files import library_for
 from experiments.evidence.trials.folder import LABELS
 from experiments.evidence.trials.generate import STUDY
 from experiments.evidence.trials.heaps import cases_of

@@ -10,7 +10,7 @@ import numpy as np
 
 from dem_warp import PRESETS, Case, ContactLaws, Interaction
 from dem_warp.laws.conventions import Rolling
-from experiments.discover.library import LONG_LEVER
+from experiments.discover.mechanism_files import LONG_LEVER
 from experiments.evidence.trials.other_codes.odd_lift import odd
 from experiments.export.lift import FIRST_SEED
 

@@ -8,8 +8,8 @@ from dem_warp import Case
 from doe.discrepancy import Point
 from experiments.cases import Workers
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.discover.engine import EngineSimulator
-from experiments.discover.library import library_for
+from experiments.discover.engine_simulator import EngineSimulator
+from experiments.discover.mechanism_files import library_for
 from experiments.evidence.trials.generate import PIXEL_SHARE, STUDY
 from experiments.evidence.trials.other_codes.effects import STRANGERS
 from experiments.evidence.trials.other_codes.program import engine_for

@@ -23,8 +23,8 @@ from experiments.cases.engines.contract import command_program
 from experiments.cases.engines.program import ProgramEngine
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cli import app
-from experiments.discover.engine import EngineSimulator
-from experiments.discover.library import library_for
+from experiments.discover.engine_simulator import EngineSimulator
+from experiments.discover.mechanism_files import library_for
 from experiments.measurement.states import measure
 from experiments.studyfile import load_study
 from experiments.studyfile.observables import PHOTOGRAPHED

@@ -11,8 +11,8 @@ from dem_warp import PRESETS
 from doe.discrepancy import Point
 from experiments.cases import OwnWorkers
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.discover.engine import EngineSimulator
-from experiments.discover.library import library_for
+from experiments.discover.engine_simulator import EngineSimulator
+from experiments.discover.mechanism_files import library_for
 from experiments.evidence.trials.generate import STUDY
 from experiments.evidence.trials.other_codes.conventions import (
     ERROR,

@@ -366,7 +366,7 @@ def test_a_code_makes_every_effect(code: str, tmp_path: Path) -> None:
 
 
 def _largest(effect: str) -> float:
-    from experiments.discover.library import library_for
+    from experiments.discover.mechanism_files import library_for
 
     [mechanism] = [each for each in library_for(load_study(STUDY, "bench")) if each.name == effect]
     return mechanism.maximum

@@ -8,8 +8,8 @@ import pytest
 from doe.discrepancy import Discovery, Measured, Settings, Verdict, fit_emulator
 from experiments.cases import OwnWorkers
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.discover.engine import EngineSimulator
-from experiments.discover.library import library_for
+from experiments.discover.engine_simulator import EngineSimulator
+from experiments.discover.mechanism_files import library_for
 from experiments.discover.search import Search
 from experiments.evidence.trials.declaration import Declaration
 from experiments.evidence.trials.desk import Desk, read_data

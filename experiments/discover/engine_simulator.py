@@ -13,10 +13,10 @@ from experiments.cases import Engine, Workers, engine_of
 from experiments.cases.engines.key import case_key
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.workers.own import THIS_MACHINE
-from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.discover.wave import WaveRunner
 from experiments.io.errors import StudyError
 from experiments.studyfile import Study
+from experiments.studyfile.mechanism_factor import MechanismFactor, with_mechanisms
 from experiments.studyfile.observables import BY_NAME, VERSION
 
 
@@ -50,7 +50,7 @@ class EngineSimulator:
     def __init__(
         self,
         study: Study,
-        library: Sequence[Mechanism],
+        library: Sequence[MechanismFactor],
         table: OutcomeTable,
         workers: Workers = THIS_MACHINE,
         progress: Callable[[Progress], None] | None = None,

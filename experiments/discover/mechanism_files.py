@@ -9,8 +9,8 @@ units.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,8 +23,9 @@ from dem_warp.scenes.poured_scene import GRAVITY
 from experiments.io.toml_files import read_toml
 from experiments.io.units import Quantity
 from experiments.studyfile import Study, StudyError
-from experiments.studyfile.factor_section import Parameters, merge
-from experiments.studyfile.places import Places, drop, nested, value_at
+from experiments.studyfile.factor_section import Parameters
+from experiments.studyfile.mechanism_factor import MechanismFactor, with_mechanisms
+from experiments.studyfile.places import Places, value_at
 from experiments.studyfile.schema import Section, field_at, validated
 from experiments.studyfile.sections import Physics
 from experiments.studyfile.setters import setter_at
@@ -97,43 +98,7 @@ FILES: Mapping[str, Path] = Registry(
 """The files of the library, by the names of the mechanisms."""
 
 
-@dataclass(frozen=True)
-class Mechanism:
-    """A physical effect that a study may lack, in the units of that study."""
-
-    name: str
-    """Name in every table; that of the factor too which the study has with it."""
-    title: str
-    sentence: str
-    """Its name in physics, and what it is in plain language."""
-    kind: str
-    """Place where it acts: in the contacts, in the test, or as a property of the grains."""
-    parameters: tuple[str, ...]
-    """Place, or places of one value, in the study."""
-    unit: str
-    """Unit of the sizes, ``1`` for none."""
-    null: float
-    maximum: float
-    """Size that the study has without it, and the largest that is searched."""
-    source: str
-    confirm: str
-    """Source of law and range, and the further experiment that would show it."""
-    directed: bool = False
-    """It has a direction, which the study has along x."""
-    saturation: float | None = None
-    """Distance from the null over which what a step of the size adds falls to 1/e; None: it stays."""
-    companions: tuple[tuple[str, float | str], ...] = ()
-    """Further settings that it needs in the study, by place."""
-
-    def factor(self, low: float | None = None, high: float | None = None) -> dict[str, Any]:
-        """Write it as a ``[[factor]]`` of a study, its range this one or the whole."""
-        ends = (self.null if low is None else low, self.maximum if high is None else high)
-        low_end, high_end = (end if self.unit == "1" else str(Quantity(end, self.unit)) for end in ends)
-        places = list(self.parameters)
-        return {"name": self.name, "label": self.title, "parameter": places, "low": low_end, "high": high_end}
-
-
-def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[Mechanism, ...]:
+def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[MechanismFactor, ...]:
     """Read the mechanisms that a study may lack from files by their names, in alphabetical order.
 
     One that the study cannot have is left out: its test has no such setting, a factor varies it already, it
@@ -149,7 +114,7 @@ def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[Mechan
     return tuple(mechanism for mechanism in found if mechanism is not None and _can_have(study, mechanism))
 
 
-def with_maximum(study: Study, mechanism: Mechanism, size: Quantity) -> Mechanism:
+def with_maximum(study: Study, mechanism: MechanismFactor, size: Quantity) -> MechanismFactor:
     """Give a mechanism of its `library_for` another largest size.
 
     Raises
@@ -186,32 +151,7 @@ def grain_scales(case: Case) -> dict[str, float]:
     return {"grain weight / radius": weight / radius, "grain volume": volume, "grain stiffness": stiffness}
 
 
-def with_mechanisms(
-    study: Study,
-    mechanisms: Sequence[Mechanism],
-    ranges: Mapping[str, tuple[float, float]] | None = None,
-) -> Study:
-    """Add mechanisms of its `library_for` to a study, each as one more factor.
-
-    A mechanism without ends of its own in ``ranges`` goes from its null to its maximum.
-
-    Raises
-    ------
-    StudyError
-        When two of them exclude each other.
-    """
-    document = study.document
-    for mechanism in mechanisms:
-        for place in mechanism.parameters:
-            drop(document, place.split("."))
-        for place, value in mechanism.companions:
-            document = merge(nested(place.split("."), value), document)
-        factor = mechanism.factor(*(ranges or {}).get(mechanism.name, ()))
-        document["factor"] = [*document.get("factor", []), factor]
-    return study.with_document(document)
-
-
-def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float]) -> Mechanism | None:
+def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float]) -> MechanismFactor | None:
     """Read a file for a study; None where the study cannot have the mechanism."""
     file = _read(path)
     null, *others = (_start(study, tuple(place.split(".")), file) for place in file.parameters)
@@ -222,7 +162,7 @@ def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float])
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
     told = {"title", "sentence", "kind", "parameters", "unit", "source", "confirm", "directed", "saturation"}
     shared = file.model_dump(include=told)
-    return Mechanism(name, **shared, null=null, maximum=maximum, companions=companions)
+    return MechanismFactor(name, **shared, null=null, maximum=maximum, companions=companions)
 
 
 def _read(path: Path) -> MechanismFile:
@@ -230,7 +170,7 @@ def _read(path: Path) -> MechanismFile:
     return validated(MechanismFile, document, Places.read(path, text))
 
 
-def _can_have(study: Study, mechanism: Mechanism) -> bool:
+def _can_have(study: Study, mechanism: MechanismFactor) -> bool:
     try:
         with_mechanisms(study, [mechanism])
     except StudyError:
