@@ -11,7 +11,7 @@ from experiments.bridge.crossing import check_order, cross
 from experiments.bridge.result import Crossing
 from experiments.bridge.source import read_source
 from experiments.calibrate import Campaign
-from experiments.calibrate.campaign import StageHook
+from experiments.calibrate.stages import StageHook
 from experiments.cases import open_workers, with_engine
 from experiments.cases.store.folder import locked
 from experiments.io.errors import InputError

@@ -65,7 +65,7 @@ app = typer.Typer(
 def _show_version(wanted: bool) -> None:
     if wanted:
         from dem_warp.version import source_commit
-        from experiments.io.version import program_version
+        from experiments.io.program_version import program_version
 
         commit = source_commit()
         typer.echo(f"dem-warp {program_version()}" + (f" ({commit})" if commit else ""))

@@ -75,7 +75,7 @@ ADDITIONS = {
 
 PROGRAM = """
 import json, pathlib
-from experiments.calibrate.screening import screening_design
+from experiments.calibrate.screening_stage import screening_design
 from experiments.cli import app
 from experiments.discover.mechanism_files import library_for
 from experiments.export import EXPORTERS

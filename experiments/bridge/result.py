@@ -11,7 +11,7 @@ import pandas as pd
 from doe import Comparison, Region, Transfer
 from experiments.bridge.source import Source
 from experiments.calibrate.values import interval_text, listed, quantity
-from experiments.io.plain import jsonable
+from experiments.io.plain_data import jsonable
 
 
 class BridgeOutcome(StrEnum):

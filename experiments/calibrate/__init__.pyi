@@ -1,8 +1,8 @@
 """The public names: each is loaded with its module when it is first used."""
 
-from .campaign import calibrate
 from .cases import Runner, case_seed
 from .results import Campaign, ClimbEnd, Decision, Outcome
+from .stages import calibrate
 
 __all__ = [
     "Campaign",

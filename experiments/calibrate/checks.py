@@ -56,7 +56,7 @@ def check_study(study: Study) -> None:
         rule = f"is an angle, but {leading.name} leads: state margin_sds instead"
         raise ValueError(f"campaign.verification.margin: {rule}, got {settings.verification.margin:g}")
     # the designs load the libraries of statistics: what can be said without them is said before
-    from experiments.calibrate.screening import screening_design
+    from experiments.calibrate.screening_stage import screening_design
 
     screening_design(study.factors, settings.screening)
 

@@ -17,7 +17,7 @@ import pandas as pd
 from doe import Design, Mode, ProfileSample, Sample
 from doe.errors import RuleError
 from experiments.calibrate.cases import measured, too_many_failed
-from experiments.calibrate.screening import analyse_screening
+from experiments.calibrate.screening_stage import analyse_screening
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response, Target
 

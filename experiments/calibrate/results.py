@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from doe import Comparison, NoiseFloor, Sample
-from experiments.io.plain import indexed, jsonable
+from experiments.io.plain_data import indexed, jsonable
 
 if TYPE_CHECKING:
     from doe import Design, Factor, JointFit, Region, ScreenResult, Surface

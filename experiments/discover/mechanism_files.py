@@ -25,9 +25,9 @@ from experiments.io.units import Quantity
 from experiments.studyfile import Study, StudyError
 from experiments.studyfile.factor_section import Parameters
 from experiments.studyfile.mechanism_factor import MechanismFactor, with_mechanisms
+from experiments.studyfile.physics import Physics
 from experiments.studyfile.places import Places, value_at
 from experiments.studyfile.schema import Section, field_at, validated
-from experiments.studyfile.sections import Physics
 from experiments.studyfile.setters import setter_at
 
 FORMER_NAMES = {"contact_cohesion": "contact_adhesion"}

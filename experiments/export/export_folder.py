@@ -10,7 +10,7 @@ from experiments.export.exporters import EXPORTERS
 from experiments.export.facts import grain_rows, laws_row
 from experiments.io.errors import InputError, Problem
 from experiments.io.files import write_text
-from experiments.io.version import program_version
+from experiments.io.program_version import program_version
 
 README = "README.md"
 """File that says what was translated how."""

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Self
 from experiments.calibrate.results import TargetResult
 from experiments.cases.store.folder import JOURNAL
 from experiments.io.errors import StudyError
-from experiments.io.plain import indexed, jsonable
+from experiments.io.plain_data import indexed, jsonable
 from experiments.journal.glimpses import Glimpses, prune
 from experiments.journal.progress import time_left
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from plotly.offline import get_plotlyjs
 
 from experiments.io.errors import InputError
-from experiments.io.plain import jsonable
+from experiments.io.plain_data import jsonable
 from experiments.live.charts import charts_of
 from experiments.live.drawing import heap_spheres
 from experiments.live.folder import inside

@@ -10,7 +10,7 @@ import pandas as pd
 
 from dem_warp import EDEM
 from experiments.calibrate.results import Campaign
-from experiments.io.version import program_version
+from experiments.io.program_version import program_version
 from experiments.report.kit.latex import latex_table, latex_text
 from experiments.report.kit.markdown import markdown_table
 from experiments.report.kit.numbers import enumeration, fixed, p_clause, quantity, significant

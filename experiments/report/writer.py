@@ -14,8 +14,8 @@ import pandas as pd
 from experiments.calibrate.results import Campaign
 from experiments.cases.store.manifest import study_hash
 from experiments.io.files import write_text
-from experiments.io.plain import jsonable
-from experiments.io.version import program_version
+from experiments.io.plain_data import jsonable
+from experiments.io.program_version import program_version
 from experiments.report.campaign_page import render_page
 from experiments.report.companion import Replay
 from experiments.report.material_card import write_material_card

@@ -16,9 +16,9 @@ import pandas as pd
 from dem_warp import Progress
 from dem_warp.version import source_commit
 from experiments.calibrate import Campaign, calibrate
-from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_calibration
 from experiments.calibrate.results import StageResult
+from experiments.calibrate.stages import StageHook
 from experiments.cases import Store, Workers, open_folder, run_cases
 from experiments.cases.engines.key import engine_identity
 from experiments.cases.store.manifest import MANIFEST, write_manifest
@@ -26,7 +26,7 @@ from experiments.cases.store.outputs import publishing
 from experiments.cases.workers.own import THIS_MACHINE, watched_by
 from experiments.io.errors import StudyError
 from experiments.io.files import write_text
-from experiments.io.plain import jsonable
+from experiments.io.plain_data import jsonable
 from experiments.journal.journal import Journal
 from experiments.measurement.target import with_measurements
 from experiments.report import heap_pictures, verified_heap, write_report

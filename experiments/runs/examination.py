@@ -19,7 +19,7 @@ from experiments.cases import Resources
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.speed import Speed, few_spheres, stored_speed
 from experiments.cases.workers.submissions import submit_command
-from experiments.io.version import program_version
+from experiments.io.program_version import program_version
 from imaging.drawing.opengl import opengl_works
 
 

@@ -13,8 +13,8 @@ import pandas as pd
 from dem_warp import Case
 from doe import central_composite
 from doe.discrepancy import bank_points
-from experiments.calibrate.campaign import plan_opening
-from experiments.calibrate.screening import screening_design
+from experiments.calibrate.screening_stage import screening_design
+from experiments.calibrate.stages import plan_opening
 from experiments.cases import Resources, open_workers
 from experiments.cases.forecast.cost import Cost, cost_of, device_bytes
 from experiments.cases.store.outcome_table import OutcomeTable

@@ -1,8 +1,8 @@
 """The public names: each is loaded with its module when it is first used."""
 
 from .conditions import Condition
+from .new_study import write_template
 from .study import BUCKWHEAT, Study, StudyError, load_card, load_study, study_scales
-from .template import write_template
 
 __all__ = [
     "BUCKWHEAT",

@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from experiments.io.units import Quantity
 from experiments.studyfile.mechanisms import mechanisms_section
+from experiments.studyfile.physics import Physics
 from experiments.studyfile.scene_sections import scene_section
 from experiments.studyfile.schema import (
     Dimension,
@@ -24,7 +25,6 @@ from experiments.studyfile.schema import (
     section_of,
     steps,
 )
-from experiments.studyfile.sections import Physics
 
 
 @dataclass(frozen=True)

@@ -34,11 +34,11 @@ from experiments.studyfile.factor_section import (
     with_factor_values,
 )
 from experiments.studyfile.observables import Observable, measurable
+from experiments.studyfile.physics import GrainCountError, Physics, Scene
 from experiments.studyfile.places import KeyPath, Places, drop, nested, value_at
 from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import RawQuantity, Section, first_problem, validated
-from experiments.studyfile.sections import GrainCountError, Physics, Scene
 from experiments.studyfile.setters import changed, revised
 from experiments.studyfile.solver_section import SolverSection
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target

@@ -16,7 +16,7 @@ from worlds import RADIUS, ball_mass, grains, pair, record, small_case, solve, w
 
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.scenes.library import SCENES
-from experiments.calibrate.screening import DESIGNS
+from experiments.calibrate.screening_stage import DESIGNS
 from experiments.cases import ENGINES, Store
 from experiments.discover.mechanism_files import library_for
 from experiments.export import EXPORTERS

@@ -20,7 +20,7 @@ from experiments.cases.workers.own import THIS_MACHINE, OwnWorkers
 from experiments.cases.workers.workers import Workers
 from experiments.io.errors import InputError
 from experiments.io.files import replacing, write_text
-from experiments.io.version import with_version
+from experiments.io.program_version import with_version
 from experiments.measurement.filling import filling_reached
 from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study

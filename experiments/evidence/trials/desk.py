@@ -29,7 +29,7 @@ from experiments.evidence.trials.lockstep import Crash
 from experiments.evidence.trials.truth import Sealed
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
-from experiments.io.plain import jsonable
+from experiments.io.plain_data import jsonable
 from experiments.measurement.measured_file import read_measured
 from experiments.studyfile import Study
 

@@ -25,9 +25,9 @@ from experiments.measurement.photographs import mean_angle, measure_pictures
 from experiments.measurement.pictures import find_pictures
 from experiments.studyfile import Study, load_study, study_scales
 from experiments.studyfile.factor_section import merge
+from experiments.studyfile.new_study import TEMPLATE, new_study_path
 from experiments.studyfile.places import nested
 from experiments.studyfile.reference import study_reference
-from experiments.studyfile.template import TEMPLATE, new_study_path
 
 LARGEST_UPLOAD = 100_000_000
 """Bytes of the largest file that is taken."""

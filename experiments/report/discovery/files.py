@@ -9,7 +9,7 @@ from typing import Any
 
 from doe.discrepancy import Discovery, Settings
 from experiments.cases.store.manifest import study_hash
-from experiments.io.plain import jsonable
+from experiments.io.plain_data import jsonable
 from experiments.report.discovery.discovery_page import render_discovery
 from experiments.report.discovery.study_file import write_study_files
 from experiments.report.discovery.tables import frames

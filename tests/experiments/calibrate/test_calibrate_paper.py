@@ -9,8 +9,8 @@ import pytest
 
 from doe import Design, Factor, Sample, compare_means, noise_floor
 from experiments.calibrate import ClimbEnd
-from experiments.calibrate.climb import climb, require_crossing
-from experiments.calibrate.optimum import find_optimum
+from experiments.calibrate.climb_stage import climb, require_crossing
+from experiments.calibrate.optimum_stage import find_optimum
 from experiments.calibrate.results import (
     ClimbResult,
     NoiseFloorResult,
@@ -19,11 +19,11 @@ from experiments.calibrate.results import (
     SurfaceResult,
     TargetResult,
 )
-from experiments.calibrate.screening import analyse_screening
-from experiments.calibrate.selection import select_factors
-from experiments.calibrate.surface import explore_surface
-from experiments.calibrate.target import settle_target
-from experiments.calibrate.verification import verify
+from experiments.calibrate.screening_stage import analyse_screening
+from experiments.calibrate.selection_stage import select_factors
+from experiments.calibrate.surface_stage import explore_surface
+from experiments.calibrate.target_stage import settle_target
+from experiments.calibrate.verification_stage import verify
 from experiments.studies.buckwheat.paper import factors, published
 from experiments.studyfile.campaign import CampaignSettings, Response, Target
 

@@ -10,11 +10,11 @@ import pytest
 from doe import Design, Factor
 from experiments.calibrate import calibrate, case_seed
 from experiments.calibrate.cases import plan_cases, response_table, too_many_failed
-from experiments.calibrate.climb import _Line
+from experiments.calibrate.climb_stage import _Line
 from experiments.calibrate.results import STAGES
-from experiments.calibrate.screening import analyse_screening, screening_design
-from experiments.calibrate.surface import fit_inside
-from experiments.calibrate.target import plan_target
+from experiments.calibrate.screening_stage import analyse_screening, screening_design
+from experiments.calibrate.surface_stage import fit_inside
+from experiments.calibrate.target_stage import plan_target
 from experiments.studyfile import load_study
 from experiments.studyfile.campaign import (
     TARGET_SCENE,

@@ -10,9 +10,9 @@ import pytest
 from doe import Factor, Sample
 from experiments.calibrate import ClimbEnd, Outcome
 from experiments.calibrate.cases import StageEnd
-from experiments.calibrate.optimum import find_optimum
+from experiments.calibrate.optimum_stage import find_optimum
 from experiments.calibrate.results import ClimbResult, SurfaceResult, TargetResult
-from experiments.calibrate.surface import explore_surface, require_slope
+from experiments.calibrate.surface_stage import explore_surface, require_slope
 from experiments.studyfile.campaign import CampaignSettings, Response, Target
 
 CENTER = {"E": 1.0, "F": 1.0}

@@ -15,8 +15,8 @@ from experiments.cli import app
 from experiments.runs.campaign import check_runs
 from experiments.runs.search import OUTCOMES, Job, run_search
 from experiments.studyfile import Study, load_study, study
-from experiments.studyfile.places import Places
 from experiments.studyfile.observables import PHOTOGRAPHED
+from experiments.studyfile.places import Places
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
 STUDY = TRIAL / "study.toml"

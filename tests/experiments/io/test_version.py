@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.io import version
-from experiments.io.version import program_version, with_version
+from experiments.io import program_version
+from experiments.io.program_version import program_version, with_version
 
 ROOT = Path(__file__).resolve().parents[3]
 STATED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]

@@ -19,7 +19,7 @@ from dem_warp import Case, CaseResult
 from doe.discrepancy import Outcomes, bank_points, make_bank
 from experiments import api
 from experiments.calibrate import Campaign, Outcome
-from experiments.calibrate.campaign import StageHook
+from experiments.calibrate.stages import StageHook
 from experiments.cases import execute
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.store.outputs import LIST, sha256_of

@@ -11,11 +11,11 @@ import pytest
 from doe.discrepancy import Settings
 from experiments.studyfile import load_study, write_template
 from experiments.studyfile.campaign import CampaignSettings
+from experiments.studyfile.new_study import TEMPLATE
+from experiments.studyfile.physics import Physics
 from experiments.studyfile.reference import Row, study_reference
-from experiments.studyfile.sections import Physics
 from experiments.studyfile.setters import setter_at
 from experiments.studyfile.study import MeasurementSection
-from experiments.studyfile.template import TEMPLATE
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ from experiments.evidence.studies.wheat_drums.plan import (
 )
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
-from experiments.io.version import with_version
+from experiments.io.program_version import with_version
 from experiments.studyfile import Study
 
 DRUMS, HEAPS, FACTS = "drums.csv", "heaps.csv", "provenance.json"

@@ -14,9 +14,9 @@ import pytest
 
 from doe.discrepancy import Discovery, Interval, Settings, Verdict
 from experiments.calibrate.checks import check_study
-from experiments.calibrate.noise_floor import plan_noise_floor
+from experiments.calibrate.noise_stage import plan_noise_floor
 from experiments.discover.mechanism_files import library_for
-from experiments.io.plain import jsonable
+from experiments.io.plain_data import jsonable
 from experiments.report.discovery import Terms, write_discovery
 from experiments.runs.campaign import check_runs
 from experiments.studyfile import Study, load_study

@@ -10,10 +10,10 @@ import pandas as pd
 from doe import Design
 from experiments.calibrate.cases import Runner, StageEnd, with_combinations
 from experiments.calibrate.checks import check_study
-from experiments.calibrate.climb import climb, require_crossing
+from experiments.calibrate.climb_stage import climb, require_crossing
 from experiments.calibrate.directions import with_directions
-from experiments.calibrate.noise_floor import analyse_noise_floor, plan_noise_floor
-from experiments.calibrate.optimum import find_optimum
+from experiments.calibrate.noise_stage import analyse_noise_floor, plan_noise_floor
+from experiments.calibrate.optimum_stage import find_optimum
 from experiments.calibrate.results import (
     Campaign,
     NoiseFloorResult,
@@ -24,12 +24,12 @@ from experiments.calibrate.results import (
     TargetResult,
     VerificationResult,
 )
-from experiments.calibrate.screening import analyse_screening, plan_screening, screening_design
-from experiments.calibrate.selection import require_kept, select_factors
-from experiments.calibrate.surface import explore_surface, require_slope
-from experiments.calibrate.target import plan_target, settle_target
+from experiments.calibrate.screening_stage import analyse_screening, plan_screening, screening_design
+from experiments.calibrate.selection_stage import require_kept, select_factors
+from experiments.calibrate.surface_stage import explore_surface, require_slope
+from experiments.calibrate.target_stage import plan_target, settle_target
 from experiments.calibrate.values import p_text, quantity, worded
-from experiments.calibrate.verification import verify
+from experiments.calibrate.verification_stage import verify
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
 
