@@ -75,7 +75,7 @@ def test_a_search_builds_its_study_and_each_condition_when_a_file_is_read_alone(
     monkeypatch.setattr(study, "_build", counted)
     data = tmp_path / "measured.csv"
     data.write_text("condition,replicate,observable,value,unit\nbase,1,t75,400,ms\n", encoding="utf-8")
-    code, said, err = discover(data, "--dry-run")
+    code, _, err = discover(data, "--dry-run")
     assert code == 0, err
     assert 0 < len(built) <= 12
 

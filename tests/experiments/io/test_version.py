@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.io import program_version
+from experiments.io import program_version as version
 from experiments.io.program_version import program_version, with_version
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -19,7 +19,7 @@ from experiments.evidence.studies.buckwheat.bases.choice_tables import choice_ta
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_tables import sensitivity_tables
 from experiments.io.files import replacing, write_text
-from experiments.io.plain import jsonable
+from experiments.io.plain_data import jsonable
 from experiments.report.kit.figure import save_figure
 from experiments.report.kit.markdown import facts_list, markdown_page, markdown_table, wall_times_table
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table

@@ -30,7 +30,7 @@ from experiments.evidence.studies.buckwheat.records.published_heaps import (
 )
 from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
 from experiments.io.files import write_text
-from experiments.io.plain import jsonable
+from experiments.io.plain_data import jsonable
 from experiments.report.kit.markdown import markdown_page, markdown_table
 from experiments.report.kit.numbers import estimate, fixed
 from experiments.report.kit.table import Column, Layout, columns, make_table
