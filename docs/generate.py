@@ -18,7 +18,6 @@ from typer.main import get_command
 from dem_warp import SCENES
 from experiments.cli import app
 from experiments.discover.mechanism_files import FILES
-from experiments.evidence.robustness.cluster import plan
 from experiments.studyfile.observables import OBSERVABLES, OUTLINE
 from experiments.studyfile.reference import study_reference
 
@@ -176,7 +175,6 @@ def write_pages(folder: Path) -> None:
         "commands": commands_page(),
         "observables": observables_page(),
         "effects": effects_page(),
-        "planning": plan.page(plan.Assumptions()),
     }
     pages |= {name.replace(".", "-"): python_page(name, about) for name, about in PACKAGES.items()}
     for name, text in pages.items():

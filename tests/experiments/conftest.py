@@ -12,11 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dem_warp import CaseResult, LiftedCylinder
+from dem_warp import CaseResult
 from dem_warp.clump_fitting import fit_clump
-from dem_warp.device import resolve_device
-from experiments.evidence.performance import columns as scene
-from experiments.evidence.performance.columns import Columns
 from experiments.report import solid
 from experiments.studyfile import Study, load_study
 
@@ -116,12 +113,3 @@ def cone() -> Callable[..., CaseResult]:
         )
 
     return build
-
-
-@pytest.fixture(scope="session")
-def small_columns(tmp_path_factory: pytest.TempPathFactory) -> Columns:
-    """The benchmarks' column with sixty grains, simulated and kept."""
-    tube = LiftedCylinder(0.020, 0.020, scene.STEEL, rain_rate=300.0, grain_count=60)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(scene.SCALES, "small", (tube, 400.0))
-        return Columns("small", 1, resolve_device("cpu"), tmp_path_factory.mktemp("columns"))

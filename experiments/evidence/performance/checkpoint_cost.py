@@ -24,7 +24,7 @@ from dem_warp.batch import Batch
 from dem_warp.checkpoint import CHECKPOINT_EVERY, Checkpoints
 from experiments.cases.forecast.cost import cost_of
 from experiments.evidence.machine import machine
-from experiments.evidence.performance.results import write_results
+from experiments.evidence.performance.result_pages import write_results
 from experiments.studyfile import load_study
 
 EVERY = 1.0

@@ -20,7 +20,7 @@ from dem_warp.view import WorldView
 from dem_warp.walls import Motion
 from experiments.io.files import replacing
 
-CLUMP = Path(__file__).parents[1] / "studies" / "buckwheat" / "clump.txt"
+CLUMP = Path(__file__).parents[2] / "studies" / "buckwheat" / "clump.txt"
 BUCKWHEAT = Material(density=698.0, shear_modulus=34.325e6, poisson_ratio=0.29)
 STEEL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.30)
 GRAIN_GRAIN = Interaction(restitution=0.18, static_friction=0.46, rolling_friction=0.055)

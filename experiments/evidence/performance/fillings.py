@@ -17,7 +17,7 @@ import typer
 from dem_warp import Case, ClumpShape, Drum, GrainPopulation, Interaction, Material, Numerics, simulate
 from experiments.commands.console import clear_errors
 from experiments.commands.options import OneDevice
-from experiments.evidence.performance.results import write_results
+from experiments.evidence.performance.result_pages import write_results
 from experiments.io.files import require_folder
 from experiments.measurement.filling import filling_reached
 

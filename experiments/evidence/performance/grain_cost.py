@@ -28,7 +28,7 @@ from doe.plots.palette import BLUE, GRID, VERMILION
 from experiments.commands.options import OneDevice
 from experiments.evidence.machine import machine
 from experiments.evidence.performance.columns import CLUMP, reference_case
-from experiments.evidence.performance.results import parse_counts, write_results
+from experiments.evidence.performance.result_pages import parse_counts, write_results
 from experiments.evidence.performance.roofline import memory_bytes
 from experiments.evidence.performance.timing import run_in, time_steps
 from experiments.evidence.verification.problems.setups import bodies

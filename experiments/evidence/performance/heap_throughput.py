@@ -25,9 +25,9 @@ from experiments.commands.options import OneDevice
 from experiments.evidence.machine import machine
 from experiments.evidence.performance.columns import MOMENTS, Columns
 from experiments.evidence.performance.parallel import processes_table
-from experiments.evidence.performance.peers.comparison import compare
-from experiments.evidence.performance.peers.library import PEERS, PeerName
-from experiments.evidence.performance.results import Part, parse_counts, write_results
+from experiments.evidence.performance.peers.peer_comparison import compare
+from experiments.evidence.performance.peers.peer_list import PEERS, PeerName
+from experiments.evidence.performance.result_pages import Part, parse_counts, write_results
 from experiments.evidence.performance.roofline import Traffic, copy_bandwidth, step_traffic
 from experiments.evidence.performance.timing import Timing, run_in, start, time_steps
 

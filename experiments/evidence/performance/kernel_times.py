@@ -22,7 +22,7 @@ from dem_warp.solver import Solver
 from experiments.commands.options import OneDevice
 from experiments.evidence.machine import machine
 from experiments.evidence.performance.columns import Columns
-from experiments.evidence.performance.results import write_results
+from experiments.evidence.performance.result_pages import write_results
 from experiments.evidence.performance.timing import run_in, start
 
 REPEATS = 20

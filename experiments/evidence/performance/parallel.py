@@ -8,7 +8,7 @@ import pandas as pd
 
 from dem_warp.device import resolve_device
 from experiments.evidence.performance.columns import Columns
-from experiments.evidence.performance.results import Part
+from experiments.evidence.performance.result_pages import Part
 from experiments.evidence.performance.timing import run_in, start, time_steps
 
 PATIENCE = 600.0

@@ -14,7 +14,7 @@ import pandas as pd
 import warp as wp
 
 from dem_warp.solver import Solver
-from experiments.evidence.performance.contacts import ContactCounts, count_contacts, placed_centers
+from experiments.evidence.performance.contact_counts import ContactCounts, count_contacts, placed_centers
 
 SAMPLE = 4
 """Worlds in which contacts are counted, for the mean."""

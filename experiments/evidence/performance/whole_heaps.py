@@ -32,7 +32,7 @@ from dem_warp import (
 )
 from experiments.cases.engines.driver import Driver
 from experiments.evidence.machine import machine
-from experiments.evidence.performance.results import write_results
+from experiments.evidence.performance.result_pages import write_results
 from imaging import PictureError, heap_angle
 
 CODES = ("liggghts", "lammps")
@@ -41,7 +41,7 @@ CODES = ("liggghts", "lammps")
 SHAPES = {
     "balls": ClumpShape.sphere(2e-3),
     "rods of 3": ClumpShape.from_spheres(np.array([[0.0, 0.0, z] for z in (-2e-3, 0.0, 2e-3)]), [1.5e-3] * 3),
-    "buckwheat of 9": ClumpShape.read(Path(__file__).parents[1] / "studies" / "buckwheat" / "clump.txt"),
+    "buckwheat of 9": ClumpShape.read(Path(__file__).parents[2] / "studies" / "buckwheat" / "clump.txt"),
 }
 """Grains by name: 4 mm, 7 mm long, and the clump of the buckwheat study."""
 

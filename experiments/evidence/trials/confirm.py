@@ -23,7 +23,7 @@ from experiments.commands.console import clear_errors
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.maker import maker_of_today
 from experiments.discover.search import Search
-from experiments.evidence.trials.generate import STUDY
+from experiments.evidence.trials.generate_trials import STUDY
 from experiments.io.errors import InputError
 from experiments.io.files import replacing
 from experiments.studyfile import load_study

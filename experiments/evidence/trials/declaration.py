@@ -18,7 +18,7 @@ from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import Block
 from doe.discrepancy.fitting.model_fit import weigh
-from experiments.evidence.trials.drawing import Declared, Plan
+from experiments.evidence.trials.truths import Declared, Plan
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
 from experiments.studyfile.observables import NAMES

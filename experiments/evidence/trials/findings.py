@@ -10,7 +10,6 @@ from pathlib import Path
 import pandas as pd
 
 from doe.discrepancy import Discovery, Interval, Verdict
-from experiments.evidence.trials.lockstep import Crash
 from experiments.io.files import replacing
 from experiments.studyfile.observables import NAMES, OUTLINE, PHOTOGRAPHED
 
@@ -33,12 +32,19 @@ VIEWS = {
 """Observables that an analysis has, by its view; of a bank without outlines all have the others."""
 
 CRASH = "crash"
-"""Stands for the verdict of an analysis that raised."""
+"""Verdict of an analysis that raised."""
+
+
+@dataclass(frozen=True)
+class Crash:
+    """An analysis that raised: a result of a trial like any other."""
+
+    traceback: str
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The part of an analysis that is kept."""
+    """Part of an analysis that is kept."""
 
     trial: str
     view: str

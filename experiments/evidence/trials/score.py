@@ -9,19 +9,22 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 from scipy.stats import binomtest
 
 from doe.discrepancy import Verdict
 from experiments.discover.mechanism_files import FORMER_NAMES
-from experiments.evidence.trials.drawing import STRONG, Declared
 from experiments.evidence.trials.findings import CRASH
-from experiments.evidence.trials.roc import area_text
 from experiments.evidence.trials.truth import Kind, Label, Sealed
+from experiments.evidence.trials.truths import STRONG, Declared
 
 _JUDGED = ("kind", "truth", "true_size", "multiple", "right", "tied", "wrong")
 
 OTHERS = ("weak single", *map(str, Kind), "two names", *map(str, Verdict), CRASH)
 """Labels of a confusion that name no mechanism."""
+
+DRAWS = 2000
+"""Draws of a bootstrap over trials."""
 
 POWER_EDGES = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, math.inf)
 """Ends of the classes of size, in detectable ones."""
@@ -302,3 +305,24 @@ def _limit(question: str, wanted: str, column: pd.Series, least: float = 0.0, mo
     passed = least <= found.value <= most if found.trials else None
     value = f"{100 * found.value:.0f} % ({found})" if found.trials else str(found)
     return Aim(question, wanted, value, passed)
+
+
+def auroc(positive: np.ndarray, negative: np.ndarray) -> float:
+    """Return the probability that a positive score is the larger; ties count half (Mann and Whitney 1947)."""
+    if not len(positive) or not len(negative):
+        return float("nan")
+    ranks = stats.rankdata(np.concatenate([positive, negative]))
+    above = ranks[: len(positive)].sum() - len(positive) * (len(positive) + 1) / 2.0
+    return float(above / (len(positive) * len(negative)))
+
+
+def area_text(positive: np.ndarray, negative: np.ndarray) -> str:
+    """Format the area with its 95 % interval, by a bootstrap over the trials of each class."""
+    if not len(positive) or not len(negative):
+        return "no trials"
+    rng = np.random.default_rng(0)
+    drawn = [
+        auroc(rng.choice(positive, len(positive)), rng.choice(negative, len(negative))) for _ in range(DRAWS)
+    ]
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return f"{auroc(positive, negative):.3f} ({low:.2f} to {high:.2f})"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,21 +12,33 @@ import numpy as np
 import pandas as pd
 
 from doe.plots.palette import BLUE, MUTED, VERMILION
-from experiments.evidence.trials.declaration import Declaration
-from experiments.evidence.trials.drawing import STRONG
-from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS
-from experiments.evidence.trials.folder import NOTES, PAGE, RUNS
-from experiments.evidence.trials.kept import Record, read_record
+from experiments.evidence.trials.declaration import Declaration, read_declaration
+from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS, read_findings
 from experiments.evidence.trials.score import (
     OTHERS,
     Aim,
+    aims,
     by_mechanism,
     by_outsider,
     confusion,
     declared_aim,
+    foreign_aims,
     power_curve,
+    scored,
     unknown_area,
 )
+from experiments.evidence.trials.trials_folder import (
+    DECLARED,
+    FINDINGS,
+    LABELS,
+    NOTES,
+    PAGE,
+    REALITY,
+    RUNS,
+    SEALED,
+)
+from experiments.evidence.trials.truth import opened, read_labels, read_sealed, revealed
+from experiments.evidence.trials.truths import STRONG
 from experiments.report.kit.figure import new_axes, save_figure
 from experiments.report.kit.markdown import markdown_table, write_page
 
@@ -59,6 +73,56 @@ null, counted in gamma80; *strong* is above 1.5. A verdict is right that names t
 and nothing else; it is wrong as soon as it names one that is not there. Intervals of shares are 95 %
 (Clopper and Pearson).
 """
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A record of trials, its findings judged."""
+
+    declaration: Declaration
+    table: pd.DataFrame
+    """Rows of `scored`, of every view."""
+    sealed: int
+    """Number of sealed trials; those that have not been analysed are in no row."""
+    reality: dict[str, Any] | None = None
+    """Code that made the heaps, and how it makes each effect; None: the engine made them."""
+
+    @property
+    def code(self) -> str:
+        """Name of the code that made the heaps."""
+        return str(self.reality["name"]) if self.reality else "dem-warp"
+
+    @property
+    def title(self) -> str:
+        """Code, scale and number of trials."""
+        scale, done = self.declaration.scale or "as written", self.table["trial"].nunique()
+        return f"{self.code}, {scale}, {done} of {self.sealed} trials"
+
+    def in_view(self, view: str = EVERYTHING) -> pd.DataFrame:
+        """Return the findings of one view."""
+        return self.table[self.table["view"] == view]
+
+    def aims(self, view: str = EVERYTHING) -> tuple[Aim, ...]:
+        """Compare one view with its aims."""
+        rows = self.in_view(view)
+        if self.reality:
+            return foreign_aims(rows)
+        return aims(rows, [effect.name for effect in self.declaration.library if not effect.resolvable])
+
+
+def read_record(folder: Path) -> Record:
+    """Read a record; labels of trials that have not been analysed may be missing.
+
+    Raises
+    ------
+    InputError
+        When a label is missing, or does not fit its seal.
+    """
+    findings, sealed = read_findings([folder / FINDINGS]), read_sealed(folder / SEALED)
+    truths = revealed(read_labels(folder / LABELS), opened(sealed, findings["trial"]))
+    reality = folder / REALITY
+    made_by = json.loads(reality.read_text(encoding="utf-8")) if reality.is_file() else None
+    return Record(read_declaration(folder / DECLARED), scored(findings, truths, sealed), len(sealed), made_by)
 
 
 def write_trials_page(folder: Path) -> Path:

@@ -137,7 +137,7 @@ def revealed(labels: Sequence[Label], sealed: Sequence[Sealed]) -> dict[str, Lab
     by_trial = {label.trial: label for label in labels}
     for trial in sealed:
         if trial.trial not in by_trial:
-            raise InputError(trial.trial, "expected every sealed trial has a label", "none")
+            raise InputError(trial.trial, "the sealed trial has no label")
         if (found := by_trial[trial.trial].hash) != trial.hash:
             raise InputError(trial.trial, f"a label must have the hash {trial.hash} that sealed it", found)
     return {trial.trial: by_trial[trial.trial] for trial in sealed}

@@ -16,8 +16,8 @@ import warp as wp
 
 from dem_warp.device import resolve_device
 from experiments.commands.options import OneDevice
-from experiments.evidence.verification.library import HEAVY, PROBLEMS
-from experiments.evidence.verification.result import Result
+from experiments.evidence.verification.check import Result
+from experiments.evidence.verification.problem_list import HEAVY, PROBLEMS
 from experiments.evidence.verification.verification_page import summary, write_result, write_verification
 
 RECORD = Path(__file__).with_name("record")

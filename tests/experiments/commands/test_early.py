@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from experiments.commands.early import check_calibration_file, check_heap_file
-from experiments.evidence.performance.answers import WRONG, wrong_study
 from experiments.io.errors import StudyError
+from experiments.studyfile import write_template
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -17,6 +17,43 @@ HEAVY = {
     "matplotlib", "trimesh", "jinja2",
 }  # fmt: skip
 """Libraries that take from a tenth of a second to seconds to load."""
+
+WRONG: dict[str, tuple[str, str]] = {
+    "no TOML": ("[wall]", "[wall"),
+    "an unknown key": ("size_sd = 0.05", "size_sdd = 0.05"),
+    "a wrong unit": ('density = "700 kg/m^3"', 'density = "700 mm"'),
+    "a range reversed": ("low = 0.3\nhigh = 0.6", "low = 0.6\nhigh = 0.3"),
+    "a clump file that is not there": ('sphere = "2 mm"', 'clump = "none.txt"'),
+    "a clump that is none": ('sphere = "2 mm"', 'clump = "words.txt"'),
+    "a factor that leads nowhere": (
+        'parameter = "contact.grain-grain.static_friction"',
+        'parameter = "contact.grain-grain.stickiness"',
+    ),
+    "laws that are none": ('laws = "relative"', 'laws = "liggghtz"'),
+    "an engine that is none": ("[numerics]", '[engine]\nname = "nobody"\n\n[numerics]'),
+    "a file of measurements without its columns": (
+        'mean = "30 deg"\nsd = "0.5 deg"\nn = 5',
+        'file = "words.txt"',
+    ),
+    "a decision on no factor": ("at_most = 3", 'at_most = 3\nkeep = ["Z"]'),
+    "more grains than a case can have": ("# grain_count = 400 ", "grain_count = 1_000_000_000 "),
+    "a tube that too many grains fill": ('height = "110 mm"', 'height = "10000 m"'),
+    "a tube narrower than two grains": ('diameter = "35 mm"', 'diameter = "7 mm"'),
+}
+"""Mistakes of a study: the template's text, and its replacement."""
+
+
+def wrong_study(folder: Path, kind: str) -> Path:
+    """Write the template's study, wrong in one way."""
+    path = folder / "study.toml"
+    write_template("study", folder)
+    (folder / "words.txt").write_text("no numbers here\n", encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    old, new = WRONG[kind]
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
 
 PROGRAM = """
 import sys

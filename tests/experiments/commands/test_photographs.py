@@ -7,13 +7,9 @@ import numpy as np
 import pytest
 from commandline import dem_warp
 
-from experiments.evidence.accuracy.photographs.camera import PhoneCamera
-from experiments.evidence.accuracy.photographs.rendering import sharp_shadow
-from experiments.evidence.accuracy.photographs.sampling import photograph, photograph_in_hard_light
-from experiments.evidence.accuracy.photographs.without import picture_without_heap
 from experiments.measurement import photographs
 from experiments.measurement.photographs import drawn_names, mean_angle, measure_pictures
-from imaging import measure, save_picture
+from imaging import save_picture
 from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 
 
@@ -101,78 +97,3 @@ def test_rows_say_how_the_picture_was_seen(tmp_path: Path) -> None:
     x1, y1, x2, y2 = measured["plate"]
     assert np.degrees(np.arctan2(y2 - y1, x2 - x1)) == pytest.approx(measured["tilt"])
     assert measured["heap_pixels"] == pytest.approx(400, abs=6)
-
-
-def test_a_boards_underside_is_not_taken_for_the_ground() -> None:
-    """A board with slanting ends, a little wider than its heap: its outline is 2.9 degrees flatter."""
-    shot = photograph(600452)
-    seen = measure(shot.picture)
-    # 95 % of the pictures are within 0.8 degrees.
-    assert seen.mean == pytest.approx(shot.truth.mean, abs=0.8)
-    assert seen.doubts == ()
-
-
-def test_a_threshold_that_only_a_shadow_moves_is_no_doubt() -> None:
-    """Without shadows both thresholds show one edge, and so does one of the plain ones."""
-    shot = photograph(700254)
-    angle = measure(shot.picture)
-    assert angle.doubts == ()
-    # Two of its standard errors, .35.
-    assert angle.mean == pytest.approx(shot.truth.mean, abs=0.7)
-
-
-def test_what_one_threshold_alone_shows_of_grains_like_the_wall_is_doubted() -> None:
-    shot = photograph(700097)
-    assert "threshold" in [doubt.name for doubt in measure(shot.picture).doubts]
-
-
-def test_a_drawn_shadow_is_as_large_as_the_lamp_throws_it() -> None:
-    """A ball of radius r at distance D before a lamp shades a disc of r (D + d) / D on a wall d behind it."""
-    camera = PhoneCamera(columns=800, rows=600)
-    across, up = np.meshgrid(np.linspace(-1.0, 1.0, 401), np.linspace(-1.0, 1.0, 401))
-    wall = np.stack([across, np.full_like(across, 2.0), up], axis=-1).astype(np.float32)
-    ball = (np.array([[0.0, 0.0, 0.0]]), np.array([0.2]))
-    hidden = sharp_shadow(wall, (0.0, -4.0, 0.0), 0.0, ball, camera)
-    # A pixel of the lamp's view is a hundredth of the radius.
-    assert np.sqrt(hidden.sum() * 0.005**2 / np.pi) == pytest.approx(0.3, rel=0.02)
-    beside = sharp_shadow(wall, (-4.0, -4.0, 0.0), 0.0, ball, camera)
-    assert beside.sum() == 0.0
-
-
-def test_a_sharp_shadow_on_the_wall_is_taken_off() -> None:
-    """A bright heap on a grey wall: with its shadow it is 2.4 degrees flatter."""
-    shot = photograph_in_hard_light(800119)
-    angle = measure(shot.picture)
-    assert angle.doubts == ()
-    # 95 % of the pictures are within 0.8 degrees.
-    assert angle.mean == pytest.approx(shot.truth.mean, abs=0.8)
-
-
-@pytest.mark.parametrize("seed", [800021, 800034])
-def test_a_sharp_shadow_that_cannot_be_taken_off_is_doubted(seed: int) -> None:
-    assert "shade" in [doubt.name for doubt in measure(photograph_in_hard_light(seed).picture).doubts]
-
-
-@pytest.mark.parametrize("seed", [940281, 940463])
-def test_a_few_even_windows_between_grains_are_no_shadow(seed: int) -> None:
-    """Along a sixth of a flank these have the hue of the wall, which its pattern widens: .4 degrees."""
-    shot = photograph(seed)
-    angle = measure(shot.picture)
-    assert angle.doubts == ()
-    # 95 % of the pictures are within 0.8 degrees.
-    assert angle.mean == pytest.approx(shot.truth.mean, abs=0.8)
-
-
-@pytest.mark.parametrize("seed", [940291, 940315])
-def test_a_shadow_that_fades_away_from_the_foot_is_no_dish(seed: int) -> None:
-    """From above the foot's shadow is seen on the plate: a tenth of the width below it half of it is left."""
-    shot = photograph(seed)
-    angle = measure(shot.picture)
-    assert angle.doubts == ()
-    assert angle.mean == pytest.approx(shot.truth.mean, abs=0.8)
-
-
-def test_a_dish_of_the_walls_hue_is_doubted() -> None:
-    kind, picture = picture_without_heap(940094)
-    assert kind == "dish"
-    assert "shade" in [doubt.name for doubt in measure(picture).doubts]

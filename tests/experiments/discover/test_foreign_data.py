@@ -13,6 +13,7 @@ from shutil import copy
 
 import numpy as np
 import pytest
+from emulated import EmulatedSimulator, emulated_heaps
 from scipy import stats
 
 from doe.discrepancy import (
@@ -37,7 +38,6 @@ from doe.discrepancy.fitting.size_interval import coded_size_interval
 from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
 from doe.discrepancy.verdict.records import calibration_uses
 from experiments.discover.search import Search
-from experiments.evidence.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
 from experiments.measurement.calibration import usual_calibration
 from experiments.measurement.measured_file import read_measured
 from experiments.studyfile import load_study

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from emulated import EmulatedSimulator, emulated_heaps
 
 from doe.discrepancy import Measured, Verdict, drive, fit_emulator
 from doe.discrepancy.contest.slips import find_slips
 from experiments.discover.search import Search
-from experiments.evidence.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
 from experiments.measurement.measured_file import read_measured
 from experiments.studyfile import load_study
 from experiments.studyfile.observables import OBSERVABLES

@@ -16,7 +16,6 @@ from commandline import dem_warp
 
 from experiments.cases.engines import keeper
 from experiments.commands.console import Attempt
-from experiments.evidence import machine
 from experiments.io.files import is_device_name
 from experiments.measurement.photographs import drawn_names
 
@@ -123,15 +122,6 @@ def test_a_program_is_ended_at_its_limit_without_process_groups(
     ending = json.loads(Path(keeper.ENDING).read_text(encoding="utf-8"))
     assert (ending["timed_out"], ending["code"]) == (True, None)
     assert ending["seconds"] >= 0.5
-
-
-def test_a_machine_is_named_where_no_file_tells_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_such_file(*_: object, **__: object) -> str:
-        raise FileNotFoundError
-
-    monkeypatch.setattr(Path, "read_text", no_such_file)
-    named = machine.machine("cpu")
-    assert re.match(r"one core of \S.*, Warp ", named)
 
 
 SMALL_CAMPAIGN = """

@@ -12,7 +12,7 @@ from itertools import count, islice
 import cv2
 import numpy as np
 
-from experiments.evidence.accuracy.photographs.run import Row, figures, row_of
+from experiments.evidence.accuracy.photographs.photographs_record import Row, figures, row_of
 from experiments.evidence.accuracy.photographs.sampling import photograph_of_a_low_heap
 
 

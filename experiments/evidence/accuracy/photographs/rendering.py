@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from experiments.evidence.accuracy.photographs.camera import PhoneCamera
+from experiments.evidence.accuracy.photographs.phone_camera import PhoneCamera
 from imaging.geometry import FloatArray, Layer, Picture
 
 FINE = 2

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.evidence.accuracy.photographs.camera import PhoneCamera
-from experiments.evidence.accuracy.photographs.heaps import GrainHeap
+from experiments.evidence.accuracy.photographs.phone_camera import PhoneCamera
+from experiments.evidence.accuracy.photographs.photographed_heaps import GrainHeap
 from experiments.evidence.accuracy.photographs.rendering import Color, Lamp, Phone, Surroundings, render
 from imaging import ReposeAngle, find_outline, measure, silhouette
 from imaging.geometry import FloatArray, Picture

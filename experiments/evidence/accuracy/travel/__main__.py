@@ -18,7 +18,7 @@ import typer
 from experiments.commands.console import clear_errors
 from experiments.commands.options import OneDevice
 from experiments.evidence.accuracy.travel.cards import CARDS, CODES, FRESH_SEEDS, OWN_SEEDS, SEEDS
-from experiments.evidence.accuracy.travel.heaps import run_theirs, simulate_ours, stored_heaps, take_up
+from experiments.evidence.accuracy.travel.travel_heaps import run_theirs, simulate_ours, stored_heaps, take_up
 from experiments.evidence.accuracy.travel.travel_page import write_page
 
 app = typer.Typer(add_completion=False, help=__doc__)

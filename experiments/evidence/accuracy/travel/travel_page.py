@@ -20,7 +20,7 @@ from experiments.evidence.accuracy.travel.cards import (
     SEEDS,
     SOFTENING,
 )
-from experiments.evidence.accuracy.travel.heaps import AZIMUTHS, FIT, HEAPS, NUMBER, OURS, Heap
+from experiments.evidence.accuracy.travel.travel_heaps import AZIMUTHS, FIT, HEAPS, NUMBER, OURS, Heap
 from experiments.io.files import write_text
 from experiments.report.kit.markdown import markdown_page, markdown_table
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from dem_warp import Case, LiftedCylinder
 from experiments.evidence.performance.columns import Moment
-from experiments.evidence.performance.contacts import ContactCounts, count_contacts, placed_centers
+from experiments.evidence.performance.contact_counts import ContactCounts, count_contacts, placed_centers
 from experiments.evidence.performance.timing import Timing
 
 MARGIN = 0.01

@@ -24,8 +24,8 @@ app = drum_commands("experiments.evidence.studies.wheat_drums", __doc__, DEFAULT
 @app.command()
 def search(out: Out = DEFAULT) -> None:
     """Write a study and a table for a search, and say how to run it."""
-    from experiments.evidence.studies.wheat_drums.page import fit_of
-    from experiments.evidence.studies.wheat_drums.search import write_search
+    from experiments.evidence.studies.wheat_drums.drum_page import fit_of
+    from experiments.evidence.studies.wheat_drums.drum_search import write_search
 
     with clear_errors():
         study, fit, _ = fit_of(out)

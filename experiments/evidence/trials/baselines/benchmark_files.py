@@ -17,8 +17,8 @@ import numpy as np
 
 from doe.discrepancy import Bank, Emulator, Measured, Settings, fit_emulator, load_bank
 from experiments.evidence.trials.baselines.protocol import Problem
-from experiments.evidence.trials.drawing import Declared
 from experiments.evidence.trials.truth import Label, read_labels, write_labels
+from experiments.evidence.trials.truths import Declared
 from experiments.io.errors import InputError
 from experiments.io.files import replacing, write_text
 
@@ -60,7 +60,7 @@ class Benchmark:
         if any(not 0 <= trial.bank < len(self.banks) for trial in self.trials):
             numbers = sorted({trial.bank for trial in self.trials})
             raise InputError(
-                "Benchmark.trials", f"expected numbers of banks are 0 to {len(self.banks) - 1}", numbers
+                "Benchmark.trials", f"numbers of banks must be 0 to {len(self.banks) - 1}", numbers
             )
 
     @cached_property
@@ -72,7 +72,7 @@ class Benchmark:
         """A trial as a method sees it."""
         known = self.emulators[trial.bank].without(*trial.withheld)
         seed = zlib.crc32(trial.name.encode())
-        return Problem(trial.measured, trial.name, known, self.rules[trial.bank], seed)
+        return Problem(trial.name, known, trial.measured, self.rules[trial.bank], seed)
 
 
 def write_benchmark(folder: Path, benchmark: Benchmark, labels: Sequence[Label]) -> None:

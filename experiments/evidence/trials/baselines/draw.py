@@ -1,10 +1,9 @@
-"""The benchmark: banks and trials drawn from an emulated world, the same for every method.
+"""Draw the benchmark: banks and trials from an emulated world, the same for every method.
 
-    python -m experiments.evidence.trials.baselines.draw --out experiments/evidence/trials/baselines/benchmark
+    python -m experiments.evidence.trials.baselines.draw
 
-The emulator of the shipped bench bank, bent by what no polynomial follows, is the truth, as in
-`experiments.evidence.trials.emulated`; banks and heaps are drawn from it. Any first part of the trials is balanced:
-they come in rounds of each kind, the banks in turn.
+The emulator of the shipped bench bank, bent by what no polynomial follows, is the truth; banks and heaps are
+drawn from it. Any first part of the trials is balanced: they come in rounds of each kind, the banks in turn.
 """
 
 from __future__ import annotations
@@ -23,11 +22,15 @@ import typer
 from doe.discrepancy import Bank, Measured, Outcomes, Point, SearchSpace, Settings, fit_emulator
 from experiments.discover.search import Search
 from experiments.evidence.trials.baselines.benchmark_files import FOLDER, Benchmark, Posed, write_benchmark
+from experiments.evidence.trials.baselines.emulated_world import (
+    EmulatedSimulator,
+    emulated_heaps,
+    redrawn_bank,
+)
 from experiments.evidence.trials.declaration import declared_effects, with_names
-from experiments.evidence.trials.drawing import STRONG, Declared
-from experiments.evidence.trials.emulated_simulator import EmulatedSimulator, emulated_heaps, redrawn_bank
-from experiments.evidence.trials.generate import STUDY, bank_beside
+from experiments.evidence.trials.generate_trials import STUDY, bank_beside
 from experiments.evidence.trials.truth import Kind, Label
+from experiments.evidence.trials.truths import STRONG, Declared
 from experiments.studyfile import load_study
 
 SCALE = "bench"

@@ -1,6 +1,6 @@
 """Offsets between another code's heaps and ours, where nothing is hidden, in every observable.
 
-    python -m experiments.evidence.trials.other_codes.offsets experiments/evidence/trials/record/liggghts
+    python -m experiments.evidence.trials.other_codes.offsets experiments/evidence/trials/record/eleventh --bank BANK
 
 The heaps of a record's revealed nulls are held against the emulator of the trial study at the true factors.
 What differs is neither calibrated away nor a hidden effect: it is what the two codes do not have in common.
@@ -24,9 +24,9 @@ from doe.discrepancy.fitting.fitted_model import Model
 from experiments.commands.console import clear_errors
 from experiments.discover.search import Search
 from experiments.evidence.trials.declaration import read_declaration
-from experiments.evidence.trials.folder import DECLARED, HEAPS, LABELS, SEALED, Folder
-from experiments.evidence.trials.generate import STUDY, bank_beside
-from experiments.evidence.trials.heaps import unpack_heaps
+from experiments.evidence.trials.generate_trials import STUDY, bank_beside
+from experiments.evidence.trials.trial_heaps import unpack_heaps
+from experiments.evidence.trials.trials_folder import DECLARED, HEAPS, LABELS, SEALED, Folder
 from experiments.evidence.trials.truth import Kind, Label, read_labels
 from experiments.io.errors import InputError
 from experiments.io.files import copy_file
@@ -80,7 +80,7 @@ def offsets_table(observables: Mapping[str, str], off: np.ndarray, runs: np.ndar
     )
 
 
-def measured_offsets(record: Path) -> tuple[pd.DataFrame, int]:
+def measured_offsets(record: Path, bank: Path | None = None) -> tuple[pd.DataFrame, int]:
     """Offsets of the revealed nulls of a record, and their number.
 
     Raises
@@ -90,7 +90,7 @@ def measured_offsets(record: Path) -> tuple[pd.DataFrame, int]:
     """
     scale = read_declaration(record / DECLARED).scale
     search = Search.of(load_study(STUDY, scale or None))
-    base = Model(fit_emulator(search.read_bank(bank_beside(scale))), (), 0.0)
+    base = Model(fit_emulator(search.read_bank(bank or bank_beside(scale))), (), 0.0)
     nulls = [label for label in read_labels(record / LABELS) if label.kind is Kind.NULL]
     if len(nulls) < 2:
         raise InputError(str(record / LABELS), "needs two revealed trials that hide nothing", len(nulls))
@@ -104,10 +104,13 @@ def measured_offsets(record: Path) -> tuple[pd.DataFrame, int]:
     return offsets_table({name: units[name] for name in base.emulator.observables}, off, runs), len(nulls)
 
 
-def main(record: Annotated[Path, typer.Argument(help="Record of a second reality, with its heaps.")]) -> None:
+def main(
+    record: Annotated[Path, typer.Argument(help="Record of trials of another code, with its heaps.")],
+    bank: Annotated[Path | None, typer.Option(help="Bank of the trial study. Default: the kept one.")] = None,
+) -> None:
     """Print the offsets between the record's code and ours."""
     with clear_errors():
-        table, nulls = measured_offsets(record)
+        table, nulls = measured_offsets(record, bank)
         print(f"{nulls} trials that hide nothing.\n\n{markdown_table(table)}")
 
 

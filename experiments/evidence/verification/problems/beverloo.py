@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, Hopper, Interaction, Material
+from experiments.evidence.verification.check import Curve, Plot, Result, Row, absolute_row, detection_row
 from experiments.evidence.verification.problems.setups import GRAVITY, STEEL
 from experiments.evidence.verification.problems.stored import finished_cases
-from experiments.evidence.verification.result import Curve, Plot, Result, Row, absolute_row, detection_row
 
 K, K_SPREAD = 1.4, 0.2
 """Correction of the outlet, in sphere diameters, fixed before any run."""

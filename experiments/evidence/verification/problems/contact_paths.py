@@ -14,8 +14,8 @@ import numpy as np
 from dem_warp import ClumpShape, ContactLaws, Interaction, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Plane
+from experiments.evidence.verification.check import Curve, Plot, Result, Row
 from experiments.evidence.verification.problems.setups import GRAVITY, STEEL, bodies, record, world
-from experiments.evidence.verification.result import Curve, Plot, Result, Row
 from experiments.export import Contact
 
 RADII = (1.5e-3, 1.0e-3)

@@ -20,6 +20,7 @@ import numpy as np
 import typer
 
 from dem_warp import PRESETS
+from experiments.evidence.verification.check import Result, Row
 from experiments.evidence.verification.problems.contact_paths import (
     PATHS,
     RADII,
@@ -35,7 +36,6 @@ from experiments.evidence.verification.problems.contact_programs import (
     program_text,
     trajectory_of,
 )
-from experiments.evidence.verification.result import Result, Row
 from experiments.export.deme_exporter import DEME
 from experiments.io.files import write_text
 

@@ -8,6 +8,15 @@ import numpy as np
 from dem_warp import ClumpShape, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Cylinder, Plane
+from experiments.evidence.verification.check import (
+    Curve,
+    Plot,
+    Result,
+    Row,
+    absolute_row,
+    detection_row,
+    order_row,
+)
 from experiments.evidence.verification.problems.energy_account import PARTS, STORED, EnergyAccount
 from experiments.evidence.verification.problems.setups import (
     BUCKWHEAT,
@@ -17,15 +26,6 @@ from experiments.evidence.verification.problems.setups import (
     bodies,
     contact,
     world,
-)
-from experiments.evidence.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    detection_row,
-    order_row,
 )
 
 SOFT = Material(BUCKWHEAT.density, BUCKWHEAT.shear_modulus / 400.0, BUCKWHEAT.poisson_ratio)

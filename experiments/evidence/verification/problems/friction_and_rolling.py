@@ -8,6 +8,7 @@ from dem_warp import ClumpShape, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.walls import Plane
+from experiments.evidence.verification.check import Curve, Plot, Result, Row, absolute_row, relative_row
 from experiments.evidence.verification.problems.setups import (
     BUCKWHEAT,
     CLUMP,
@@ -19,7 +20,6 @@ from experiments.evidence.verification.problems.setups import (
     record,
     world,
 )
-from experiments.evidence.verification.result import Curve, Plot, Result, Row, absolute_row, relative_row
 
 RADIUS = 5e-3
 SUBSTANCE = Material(density=1000.0, shear_modulus=10e6, poisson_ratio=0.25)

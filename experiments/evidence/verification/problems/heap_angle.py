@@ -10,8 +10,8 @@ from dem_warp import Case, CaseResult, LiftedCylinder, simulate
 from dem_warp.scenes.poured_scene import default_skin
 from dem_warp.walls import Mesh, Wall
 from doe import Comparison, Sample, compare_means
+from experiments.evidence.verification.check import Curve, Plot, Result, Row, absolute_row
 from experiments.evidence.verification.problems.stored import finished_cases, repose_angles
-from experiments.evidence.verification.result import Curve, Plot, Result, Row, absolute_row
 from experiments.studyfile import Study, load_study
 
 MARGIN = 1.0

@@ -10,8 +10,7 @@ from dem_warp import ClumpShape, Material, rayleigh_time
 from dem_warp.model import WorldSetup
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.walls import Cylinder, Motion, Plane
-from experiments.evidence.verification.problems.setups import GRAVITY, STEEL, bodies, contact
-from experiments.evidence.verification.result import (
+from experiments.evidence.verification.check import (
     Curve,
     Plot,
     Result,
@@ -20,6 +19,7 @@ from experiments.evidence.verification.result import (
     detection_row,
     relative_row,
 )
+from experiments.evidence.verification.problems.setups import GRAVITY, STEEL, bodies, contact
 
 GLASS = Material(density=2500.0, shear_modulus=1e6, poisson_ratio=0.25)
 """As heavy as glass, but so soft that a second takes 17,000 steps; overlaps stay below a hundredth."""

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from experiments.evidence.verification.check import Row, absolute_row, relative_row
 from experiments.evidence.verification.problems.contact_ode import solve_impact
 from experiments.evidence.verification.problems.impact import Course, Impact, simulate_impacts
 from experiments.evidence.verification.problems.normal_impact import clamped_restitution
-from experiments.evidence.verification.result import Row, absolute_row, relative_row
 
 STEPS = 800
 """Steps an impact: the damping is of first order in the step."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dem_warp import PRESETS
+from experiments.evidence.verification.check import Result, Row, relative_row
 from experiments.evidence.verification.problems.contact_dumps import box_of, run_commands, run_path
 from experiments.evidence.verification.problems.contact_paths import (
     GRAIN,
@@ -19,7 +20,6 @@ from experiments.evidence.verification.problems.contact_paths import (
     every_path,
     result_of,
 )
-from experiments.evidence.verification.result import Result, Row, relative_row
 from experiments.export import lammps_text as text
 from experiments.export.lammps_exporter import LAMMPS, granular_words
 

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from dem_warp import EDEM, PRESETS, ClumpShape, ContactLaws, Interaction, Material
 from dem_warp.model import ContactCoefficients
 from dem_warp.solver import CHUNK, Solver
+from experiments.evidence.verification.check import Result, Row, detection_row
 from experiments.evidence.verification.problems.contact_dumps import run_path
 from experiments.evidence.verification.problems.setups import bodies, world
-from experiments.evidence.verification.result import Result, Row, detection_row
 from experiments.export import Contact, values
 from experiments.export import liggghts_text as text
 from experiments.export.lift import Template

@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 from dem_warp import PRESETS
+from experiments.evidence.verification.check import Result
 from experiments.evidence.verification.problems.contact_dumps import box_of, run_commands, run_path
 from experiments.evidence.verification.problems.contact_paths import (
     PathSetup,
@@ -15,7 +16,6 @@ from experiments.evidence.verification.problems.contact_paths import (
     result_of,
 )
 from experiments.evidence.verification.problems.setups import STEEL
-from experiments.evidence.verification.result import Result
 from experiments.export import liggghts_text as text
 from experiments.export import values
 from experiments.export.liggghts_exporter import LIGGGHTS

@@ -7,6 +7,15 @@ from scipy.integrate import solve_ivp
 
 from dem_warp import ClumpShape, Material, rayleigh_time
 from dem_warp.walls import Plane
+from experiments.evidence.verification.check import (
+    Curve,
+    Plot,
+    Result,
+    Row,
+    absolute_row,
+    order_row,
+    relative_row,
+)
 from experiments.evidence.verification.problems import chung_ooi
 from experiments.evidence.verification.problems.impact import HERTZ_DURATION, Course, Impact, simulate_impacts
 from experiments.evidence.verification.problems.setups import (
@@ -17,15 +26,6 @@ from experiments.evidence.verification.problems.setups import (
     contact,
     record,
     world,
-)
-from experiments.evidence.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    order_row,
-    relative_row,
 )
 
 PHASES = (0.0, 0.25, 0.5, 0.75)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from experiments.evidence.verification.check import Curve, Plot, Result, Row, absolute_row
 from experiments.evidence.verification.problems import chung_ooi
 from experiments.evidence.verification.problems.impact import Course, Impact, Partner
 from experiments.evidence.verification.problems.kicks import (
@@ -18,7 +19,6 @@ from experiments.evidence.verification.problems.kicks import (
     solved_kicks,
 )
 from experiments.evidence.verification.problems.setups import material
-from experiments.evidence.verification.result import Curve, Plot, Result, Row, absolute_row
 
 ANGLES = np.array([2.0, *np.arange(5.0, 86.0, 5.0)])
 SPINS = np.array([0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0])

@@ -8,15 +8,7 @@ from scipy.spatial.transform import Rotation
 from dem_warp import ClumpShape
 from dem_warp.model import WorldSetup
 from dem_warp.solver import CHUNK, Solver
-from experiments.evidence.verification.problems.setups import (
-    BUCKWHEAT,
-    CLUMP,
-    PRECISIONS,
-    bodies,
-    contact,
-    world,
-)
-from experiments.evidence.verification.result import (
+from experiments.evidence.verification.check import (
     Curve,
     Plot,
     Result,
@@ -24,6 +16,14 @@ from experiments.evidence.verification.result import (
     absolute_row,
     detection_row,
     order_row,
+)
+from experiments.evidence.verification.problems.setups import (
+    BUCKWHEAT,
+    CLUMP,
+    PRECISIONS,
+    bodies,
+    contact,
+    world,
 )
 
 BOOT = ClumpShape.from_spheres(

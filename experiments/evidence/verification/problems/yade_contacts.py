@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 
 from dem_warp import PRESETS
+from experiments.evidence.verification.check import Result
 from experiments.evidence.verification.problems.contact_paths import (
     PathSetup,
     Trajectory,
@@ -21,7 +22,6 @@ from experiments.evidence.verification.problems.contact_programs import (
     program_text,
     trajectory_of,
 )
-from experiments.evidence.verification.result import Result
 from experiments.export.yade_exporter import YADE
 
 TEXT = """\

@@ -10,15 +10,11 @@ import numpy as np
 import pytest
 
 from dem_warp import Case, CaseResult, Progress, simulate
-from dem_warp.batch import Batch
-from dem_warp.rollback import Rollback
 from experiments.cases import OwnWorkers
 from experiments.cases.forecast.cost import cost_of, device_bytes, relative_costs
 from experiments.cases.workers import batches, own
 from experiments.cases.workers.batches import plan_batches
 from experiments.cases.workers.wave import Wave, WaveProgress
-from experiments.evidence.performance.roofline import memory_bytes
-from experiments.evidence.performance.scenes import SKETCHES, sketch_case
 from experiments.studyfile import Study, load_study
 
 Write = Callable[..., Path]
@@ -61,17 +57,6 @@ def test_steps_are_predicted_within_a_half(small_study: Study) -> None:
     assert cost_of(case).grains == result.observables["grain_count"] == 30
 
 
-def test_the_last_grains_of_a_draw_down_are_counted_in() -> None:
-    sketch = SKETCHES["draw-down"]
-    # half as deep and with large balls: some hundred grains
-    small = sketch._replace(scene=replace(sketch.scene, slot=0.06, depth=0.018, fill_depth=0.04))
-    case = sketch_case(small, 0.004)
-    [result] = simulate([case], "cpu", 1)
-    taken = sum(phase["steps"] for phase in result.phases)
-    assert result.status == "finished"
-    assert 1 / 1.5 < cost_of(case).steps / taken < 1.5
-
-
 def test_a_case_costs_what_its_steps_and_spheres_do(write_study: Write) -> None:
     study = load_study(write_study())
     stiff = load_study(study.file, "stiff")
@@ -81,16 +66,6 @@ def test_a_case_costs_what_its_steps_and_spheres_do(write_study: Write) -> None:
     # A time step follows from the square root of the modulus, which is 400 times as high.
     assert costs[1] / costs[0] == pytest.approx(20.0, rel=0.01)
     assert costs[2] > 2.0 * costs[0]
-
-
-@pytest.mark.parametrize("precision", ["mixed", "double"])
-def test_the_memory_of_a_world_is_predicted(write_study: Write, precision: str) -> None:
-    path = write_study(("modulus_scale = 400.0", f'modulus_scale = 400.0\nprecision = "{precision}"'))
-    case = load_study(path).case({}, 1)
-    batch = Batch([case], "cpu")
-    kept = sum(array.capacity for array in Rollback(batch.solver)._kept)
-    taken = memory_bytes(batch.solver) + kept
-    assert 0.8 < device_bytes(case) / taken < 1.5, (device_bytes(case), taken)
 
 
 # ---- batches -----------------------------------------------------------------------------------------------

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from experiments.evidence.accuracy.statistics.coverage import AT_LEAST, AT_MOST, EXACT, Figure, figures_table
-from experiments.evidence.accuracy.statistics.record import FOLDER, PAGE, THEMES, page
-from experiments.evidence.accuracy.statistics.surfaces import LEVERAGE, all_within
+from experiments.evidence.accuracy.statistics.statistics_record import FOLDER, PAGE, THEMES, page
+from experiments.evidence.accuracy.statistics.surface_coverage import LEVERAGE, all_within
 
 
 @pytest.mark.parametrize("theme", THEMES)

@@ -23,7 +23,7 @@ from experiments.evidence.accuracy.travel.cards import (
     SHAPES,
     VOLUME,
 )
-from experiments.evidence.accuracy.travel.heaps import OURS, Heap, run_theirs, stored_heaps, take_up
+from experiments.evidence.accuracy.travel.travel_heaps import OURS, Heap, run_theirs, stored_heaps, take_up
 from experiments.evidence.accuracy.travel.travel_page import compare_cells, write_page
 from experiments.export import Translation
 from experiments.io.errors import InputError

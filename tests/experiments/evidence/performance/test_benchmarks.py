@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -9,16 +10,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dem_warp.batch import Batch
+from dem_warp.rollback import Rollback
 from dem_warp.solver import CHUNK
 from dem_warp.walls import Cylinder, Disc, Plane
+from experiments.cases.forecast.cost import device_bytes
 from experiments.evidence.performance import columns as scene
 from experiments.evidence.performance.columns import Columns, reference_case
-from experiments.evidence.performance.contacts import count_contacts, placed_centers
+from experiments.evidence.performance.contact_counts import count_contacts, placed_centers
 from experiments.evidence.performance.grain_cost import bed
 from experiments.evidence.performance.heap_throughput import speed_tables
-from experiments.evidence.performance.record import record_page
-from experiments.evidence.performance.results import parse_counts
-from experiments.evidence.performance.roofline import step_traffic
+from experiments.evidence.performance.performance_record import record_page
+from experiments.evidence.performance.result_pages import parse_counts
+from experiments.evidence.performance.roofline import memory_bytes, step_traffic
 from experiments.evidence.performance.timing import run_in, start, time_steps
 from experiments.report.kit.markdown import markdown_table
 from experiments.studyfile import load_study
@@ -176,3 +180,13 @@ def test_a_record_replaces_the_page_of_its_name_alone(tmp_path: Path) -> None:
 def test_tables_read_well() -> None:
     table = pd.DataFrame({"phase": ["settled"], "n": [12], "us": [54.4321], "none": [np.nan], "J": [1.2e-9]})
     assert markdown_table(table).splitlines()[2] == "| settled | 12 | 54.43 |  | 1.2e-09 |"
+
+
+@pytest.mark.parametrize("precision", ["mixed", "double"])
+def test_the_memory_of_a_world_is_predicted(write_study: Callable[..., Path], precision: str) -> None:
+    path = write_study(("modulus_scale = 400.0", f'modulus_scale = 400.0\nprecision = "{precision}"'))
+    case = load_study(path).case({}, 1)
+    batch = Batch([case], "cpu")
+    kept = sum(array.capacity for array in Rollback(batch.solver)._kept)
+    taken = memory_bytes(batch.solver) + kept
+    assert 0.8 < device_bytes(case) / taken < 1.5, (device_bytes(case), taken)

@@ -17,11 +17,11 @@ from typer.testing import CliRunner
 
 from experiments.evidence.performance import heap_throughput
 from experiments.evidence.performance.columns import Columns, Moment
-from experiments.evidence.performance.peers import lammps, liggghts, yade
-from experiments.evidence.performance.peers.comparison import SPEED, compare
+from experiments.evidence.performance.peers import lammps_peer, liggghts_peer, yade_peer
 from experiments.evidence.performance.peers.lammps_files import timed_runs
-from experiments.evidence.performance.peers.library import PEERS, PeerName
 from experiments.evidence.performance.peers.peer import PeerRun, Plan
+from experiments.evidence.performance.peers.peer_comparison import SPEED, compare
+from experiments.evidence.performance.peers.peer_list import PEERS, PeerName
 from experiments.evidence.performance.roofline import world_contacts
 from experiments.evidence.performance.timing import start
 from experiments.export.lammps_exporter import TSUJI
@@ -124,7 +124,7 @@ Install = Callable[[PeerName, str], None]
     ("name", "version", "steps", "rebuilds", "error"),
     [
         # LIGGGHTS runs thrice before it is timed, LAMMPS twice; regions are SPOT wide, numbers have 15 digits
-        (PeerName.LIGGGHTS, "LIGGGHTS-PUBLIC 3.8.0", 300, (3 + 4, 5 + 6), liggghts.SPOT),
+        (PeerName.LIGGGHTS, "LIGGGHTS-PUBLIC 3.8.0", 300, (3 + 4, 5 + 6), liggghts_peer.SPOT),
         (PeerName.LAMMPS, "LAMMPS 1 Jan 2030", 300, (2 + 3, 4 + 5), 1e-15),
         (PeerName.YADE, "Yade 2030.01", 38, (7, 11), 1e-15),
     ],
@@ -202,7 +202,7 @@ leaves.direction = -1.0  # type: ignore[attr-defined]
 def test_liggghts_gets_the_materials_of_the_case(
     small_columns: Columns, column: Moment, tmp_path: Path
 ) -> None:
-    liggghts.write_input(tmp_path, small_columns.cases[0], column, PLAN)
+    liggghts_peer.write_input(tmp_path, small_columns.cases[0], column, PLAN)
     text = (tmp_path / "column.in").read_text()
     found = {
         name: [float(word) for word in text.split(f"global {name} ")[1].splitlines()[0].split()[1:]]
@@ -219,7 +219,7 @@ def test_liggghts_gets_the_materials_of_the_case(
 def test_lammps_gets_the_case_in_its_own_terms(
     small_columns: Columns, column: Moment, tmp_path: Path
 ) -> None:
-    lammps.write_input(tmp_path, small_columns.cases[0], column, PLAN)
+    lammps_peer.write_input(tmp_path, small_columns.cases[0], column, PLAN)
     text = (tmp_path / "column.in").read_text()
     assert "exclude molecule/intra all" in text
     # E* of two grains is E / 2 (1 - v^2), of a grain and a rigid wall twice that; G* likewise with 2 - v
@@ -247,7 +247,7 @@ def test_lammps_gets_the_case_in_its_own_terms(
 
 
 def test_lammps_gets_the_bodies(small_columns: Columns, column: Moment, tmp_path: Path) -> None:
-    lammps.write_input(tmp_path, small_columns.cases[0], column, PLAN)
+    lammps_peer.write_input(tmp_path, small_columns.cases[0], column, PLAN)
     count, *lines = (tmp_path / "bodies.txt").read_text().splitlines()
     grains, shape = column.setup.grains, column.setup.shapes[0]
     bodies = np.array([line.split() for line in lines], dtype=float)
@@ -264,7 +264,7 @@ def test_lammps_gets_the_bodies(small_columns: Columns, column: Moment, tmp_path
 
 
 def test_yade_gets_the_case_in_its_own_terms(small_columns: Columns, column: Moment, tmp_path: Path) -> None:
-    yade.write_input(tmp_path, small_columns.cases[0], column, PLAN)
+    yade_peer.write_input(tmp_path, small_columns.cases[0], column, PLAN)
     given = json.loads((tmp_path / "column.json").read_text())
     assert [material["young"] for material in given["materials"]] == pytest.approx(
         [MODULUS, 2.0 * 70e9 * 1.3]
@@ -282,7 +282,7 @@ def test_yade_gets_the_case_in_its_own_terms(small_columns: Columns, column: Mom
 
 def test_yade_s_spheres_weigh_what_the_grain_does_about_its_centre(column: Moment) -> None:
     shape = column.setup.shapes[0]
-    densities = yade.part_densities(shape.centers, shape.radii, 1.3e-5)
+    densities = yade_peer.part_densities(shape.centers, shape.radii, 1.3e-5)
     masses = densities * 4 / 3 * np.pi * shape.radii**3
     assert densities.min() > 0
     assert masses.sum() == pytest.approx(1.3e-5, rel=1e-12)
@@ -292,7 +292,7 @@ def test_yade_s_spheres_weigh_what_the_grain_does_about_its_centre(column: Momen
 def test_yade_s_tube_touches_the_cylinder_from_outside(
     small_columns: Columns, column: Moment, tmp_path: Path
 ) -> None:
-    yade.write_input(tmp_path, small_columns.cases[0], column, PLAN)
+    yade_peer.write_input(tmp_path, small_columns.cases[0], column, PLAN)
     tube = small_columns.cases[0].scene
     corners = np.array(json.loads((tmp_path / "column.json").read_text())["facets"])
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -300,7 +300,7 @@ def test_yade_s_tube_touches_the_cylinder_from_outside(
     distances = np.abs(np.einsum("ij,ij->i", normals, corners[:, 0])) / (2 * areas)
     np.testing.assert_allclose(distances, tube.diameter / 2, rtol=1e-12)
     # nothing is left open: n sides of 2 R tan(pi / n)
-    perimeter = yade.SIDES * tube.diameter * np.tan(np.pi / yade.SIDES)
+    perimeter = yade_peer.SIDES * tube.diameter * np.tan(np.pi / yade_peer.SIDES)
     assert areas.sum() == pytest.approx(perimeter * corners[..., 2].max(), rel=1e-12)
     assert corners[..., 2].max() > tube.height
 
@@ -308,7 +308,7 @@ def test_yade_s_tube_touches_the_cylinder_from_outside(
 # ---- what cannot run ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("write", [liggghts.write_input, yade.write_input])
+@pytest.mark.parametrize("write", [liggghts_peer.write_input, yade_peer.write_input])
 def test_grains_of_several_sizes_are_refused(
     small_columns: Columns, column: Moment, tmp_path: Path, write: Callable[..., None]
 ) -> None:

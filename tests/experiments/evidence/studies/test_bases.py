@@ -12,16 +12,16 @@ import pytest
 
 from dem_warp import Case, CaseResult
 from experiments.evidence.studies.buckwheat.bases import __main__ as command
-from experiments.evidence.studies.buckwheat.bases import choice, simulation
-from experiments.evidence.studies.buckwheat.bases.choice import BaseChoice, Candidate, Misfits, written
-from experiments.evidence.studies.buckwheat.bases.choice_tables import choice_tables
-from experiments.evidence.studies.buckwheat.bases.grid import bases, chosen_bases, grid
-from experiments.evidence.studies.buckwheat.bases.simulation import (
+from experiments.evidence.studies.buckwheat.bases import base_heaps, choice
+from experiments.evidence.studies.buckwheat.bases.base_heaps import (
     Folder,
     angle_column,
     batches,
     measure_bases,
 )
+from experiments.evidence.studies.buckwheat.bases.choice import BaseChoice, Candidate, Misfits, written
+from experiments.evidence.studies.buckwheat.bases.choice_tables import choice_tables
+from experiments.evidence.studies.buckwheat.bases.grid import bases, chosen_bases, grid
 from experiments.io.errors import InputError, StoreError
 from experiments.studies.buckwheat.replay.replay import Replay
 from experiments.studies.buckwheat.replay.runs import DESIGNS
@@ -144,7 +144,7 @@ def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> 
         for index in range(len(cases)):
             on_result(index, heap)
 
-    monkeypatch.setattr(simulation, "simulate", simulate)
+    monkeypatch.setattr(base_heaps, "simulate", simulate)
     return sizes
 
 

@@ -17,7 +17,7 @@ SCRIPTS = [
     ("experiments.evidence.studies.buckwheat.bases.__main__", ["simulate"]),
     ("experiments.evidence.studies.buckwheat.sensitivity.__main__", []),
     ("experiments.studies.buckwheat.climb", []),
-    ("experiments.evidence.accuracy.outlines.run", ["--out", "out"]),
+    ("experiments.evidence.accuracy.outlines.outlines_record", ["--out", "out"]),
     ("experiments.evidence.verification.__main__", []),
 ]
 
@@ -38,8 +38,8 @@ def run(module: str, words: list[str]) -> tuple[int, str]:
     [
         ("experiments.evidence.studies.cellulose.__main__", ["run", "--scale", "bench", "--device", "cpu"]),
         ("experiments.evidence.studies.wheat_drums.__main__", ["run", "--scale", "bench", "--device", "cpu"]),
-        ("experiments.evidence.accuracy.outlines.run", []),
-        ("experiments.evidence.accuracy.outlines.drawn", []),
+        ("experiments.evidence.accuracy.outlines.outlines_record", []),
+        ("experiments.evidence.accuracy.outlines.drawn_outlines", []),
         ("experiments.evidence.performance.fillings", []),
     ],
 )

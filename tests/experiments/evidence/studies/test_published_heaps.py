@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from doe.discrepancy import Discovery, Settings, Verdict
-from experiments.evidence.studies.buckwheat.records.disagreement import PAGE, disagreement_page
+from experiments.evidence.studies.buckwheat.records.bases_disagreement import PAGE, disagreement_page
 from experiments.evidence.studies.buckwheat.records.paper_record import FOLDER
 from experiments.evidence.studies.buckwheat.records.published_heaps import (
     CENTRE,

@@ -15,7 +15,7 @@ from dem_warp import Case, CaseResult
 from dem_warp.clumps import ClumpShape
 from experiments.cases import Store, execute
 from experiments.cases.workers import own
-from experiments.evidence.studies.buckwheat import clumps
+from experiments.evidence.studies.buckwheat import seed_clumps
 from experiments.evidence.studies.buckwheat.sensitivity import __main__ as sensitivities
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.evidence.studies.buckwheat.sensitivity.variants import BASE, chosen_variants, variants
@@ -173,18 +173,20 @@ def test_without_a_base_nothing_is_compared(tmp_path: Path) -> None:
 
 
 def test_the_clumps_lie_inside_the_measured_size() -> None:
-    for name, recipe in clumps.CLUMPS.items():
-        shape = ClumpShape.read(clumps.FOLDER / f"{name}.txt")
-        *across, height = sorted(clumps.extents(shape))
+    for name, recipe in seed_clumps.CLUMPS.items():
+        shape = ClumpShape.read(seed_clumps.FOLDER / f"{name}.txt")
+        *across, height = sorted(seed_clumps.extents(shape))
         assert shape.sphere_count == recipe.spheres
         # Written to 1e-9 mm.
-        assert height <= clumps.HEIGHT * (1.0 + 1e-9)
-        assert max(across) <= clumps.EDGE * (1.0 + 1e-9)
-        assert max(height / clumps.HEIGHT, max(across) / clumps.EDGE) == pytest.approx(1.0, rel=1e-9)
+        assert height <= seed_clumps.HEIGHT * (1.0 + 1e-9)
+        assert max(across) <= seed_clumps.EDGE * (1.0 + 1e-9)
+        assert max(height / seed_clumps.HEIGHT, max(across) / seed_clumps.EDGE) == pytest.approx(
+            1.0, rel=1e-9
+        )
 
 
 def test_a_clump_is_the_one_of_its_recipe() -> None:
-    made, kept = clumps.CLUMPS["flat-5"].clump(), ClumpShape.read(clumps.FOLDER / "flat-5.txt")
+    made, kept = seed_clumps.CLUMPS["flat-5"].clump(), ClumpShape.read(seed_clumps.FOLDER / "flat-5.txt")
     # Written to 1e-9 mm, then turned into principal axes again.
     np.testing.assert_allclose(made.radii, kept.radii, rtol=1e-8)
     np.testing.assert_allclose(np.abs(made.centers), np.abs(kept.centers), atol=1e-10)

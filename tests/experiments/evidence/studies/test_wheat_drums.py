@@ -8,11 +8,11 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.evidence.studies.cellulose.__main__ import app as cellulose_app
-from experiments.evidence.studies.wheat_drums import campaign, plan
+from experiments.evidence.studies.wheat_drums import drum_campaign, drum_plan
 from experiments.evidence.studies.wheat_drums.__main__ import app as wheat_app
-from experiments.evidence.studies.wheat_drums.fit import SETTINGS, Slopes, fit_slopes
-from experiments.evidence.studies.wheat_drums.page import write_record
-from experiments.evidence.studies.wheat_drums.search import write_search
+from experiments.evidence.studies.wheat_drums.drum_fit import SETTINGS, Slopes, fit_slopes
+from experiments.evidence.studies.wheat_drums.drum_page import write_record
+from experiments.evidence.studies.wheat_drums.drum_search import write_search
 from experiments.io.errors import InputError
 from experiments.measurement.measured_file import read_measured
 from experiments.studyfile import Study, load_study
@@ -23,7 +23,7 @@ TRUTH = np.array([0.2, -0.3, 0.9, 0.1, -0.5, -0.2])
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return plan.study_at("bench")
+    return drum_plan.study_at("bench")
 
 
 def slope(drums: np.ndarray, inclined: np.ndarray) -> np.ndarray:
@@ -34,10 +34,10 @@ def slope(drums: np.ndarray, inclined: np.ndarray) -> np.ndarray:
 
 
 def drums_of(study: Study, count: int = 22) -> pd.DataFrame:
-    table = plan.planned_drums(study, count)
-    inclined = (table["scene"] == plan.INCLINED).to_numpy(float)
+    table = drum_plan.planned_drums(study, count)
+    inclined = (table["scene"] == drum_plan.INCLINED).to_numpy(float)
     noise = np.random.default_rng(2).normal(0.0, 0.5, len(table))
-    return table.assign(dynamic_angle=slope(plan.coded(study, table), inclined) + noise)
+    return table.assign(dynamic_angle=slope(drum_plan.coded(study, table), inclined) + noise)
 
 
 def measured_of(truth: np.ndarray) -> dict:
@@ -46,21 +46,21 @@ def measured_of(truth: np.ndarray) -> dict:
     means = [slope(drums, np.zeros(4)).mean(), *slope(drums, np.ones(4))]
     return {
         name: type(sample)(float(mean), sample.sd, sample.n)
-        for (name, sample), mean in zip(plan.data().items(), means, strict=True)
+        for (name, sample), mean in zip(drum_plan.data().items(), means, strict=True)
     }
 
 
 def test_the_data_are_those_of_the_source():
-    found = plan.data()
-    assert list(found) == [plan.UPRIGHT, *plan.SHELLS]
+    found = drum_plan.data()
+    assert list(found) == [drum_plan.UPRIGHT, *drum_plan.SHELLS]
     assert [sample.n for sample in found.values()] == [20, 5, 5, 5, 5]
     # the source pools sqrt(8.52); its printed angles alone give 2.75
-    angles = pd.read_csv(plan.HERE / "angles.csv", comment="#").groupby("shell")["angle_deg"]
-    assert np.sqrt(angles.var().mean()) == pytest.approx(plan.INCLINED_SD, abs=0.2)
+    angles = pd.read_csv(drum_plan.HERE / "angles.csv", comment="#").groupby("shell")["angle_deg"]
+    assert np.sqrt(angles.var().mean()) == pytest.approx(drum_plan.INCLINED_SD, abs=0.2)
 
 
 def test_a_kernel_has_the_stated_size():
-    case = plan.study_at("h200").case({}, 0)
+    case = drum_plan.study_at("h200").case({}, 0)
     shape = case.grains.mixture.shapes[0]
     low = (shape.centers - shape.radii[:, None]).min(axis=0)
     high = (shape.centers + shape.radii[:, None]).max(axis=0)
@@ -68,7 +68,7 @@ def test_a_kernel_has_the_stated_size():
 
 
 def test_drums_differ_by_their_axis_and_their_cover(study):
-    table = plan.planned_drums(study, 8)
+    table = drum_plan.planned_drums(study, 8)
     assert table["seed"].is_unique
     row = table.iloc[1]
     settings = {factor.name: float(row[factor.name]) for factor in study.factors}
@@ -93,10 +93,10 @@ def test_the_fit_finds_what_was_made_up(study):
 
 def test_a_datum_that_contradicts_the_others_is_seen(study):
     slopes, data = Slopes.of(study, drums_of(study)), measured_of(TRUTH)
-    wrong = data | {plan.UPRIGHT: type(data["steel"])(60.0, 3.12, 20)}
+    wrong = data | {drum_plan.UPRIGHT: type(data["steel"])(60.0, 3.12, 20)}
     assert fit_slopes(slopes, wrong).chi2 > 20.0
-    without = fit_slopes(slopes, wrong, leave_out=plan.UPRIGHT).foretold().set_index("test")
-    assert without.loc[plan.UPRIGHT, "high"] < 60.0
+    without = fit_slopes(slopes, wrong, leave_out=drum_plan.UPRIGHT).foretold().set_index("test")
+    assert without.loc[drum_plan.UPRIGHT, "high"] < 60.0
 
 
 def test_a_run_has_its_tables_its_page_and_its_search(study, tmp_path, monkeypatch):
@@ -110,35 +110,35 @@ def test_a_run_has_its_tables_its_page_and_its_search(study, tmp_path, monkeypat
             told = {"angle": 30.0 + np.arange(len(table)), "angle_se": 0.4}
         return table.assign(status="finished", reason="", grain_count=150.0, **told)
 
-    monkeypatch.setattr(campaign, "run_cases", pretend)
-    campaign.run_study("bench", tmp_path, "cpu")
-    heaps = pd.read_csv(tmp_path / campaign.HEAPS)
-    assert len(heaps) == plan.RUNS["bench"].heaps
+    monkeypatch.setattr(drum_campaign, "run_cases", pretend)
+    drum_campaign.run_study("bench", tmp_path, "cpu")
+    heaps = pd.read_csv(tmp_path / drum_campaign.HEAPS)
+    assert len(heaps) == drum_plan.RUNS["bench"].heaps
     assert heaps["mu_wall"].between(0.05, 1.0).all()
-    assert json.loads((tmp_path / campaign.FACTS).read_text())["scale"] == "bench"
+    assert json.loads((tmp_path / drum_campaign.FACTS).read_text())["scale"] == "bench"
     page = write_record(tmp_path).read_text(encoding="utf-8")
     assert "31.7 deg" in page
     assert (tmp_path / "slopes.png").is_file()
-    fit = fit_slopes(Slopes.of(study, drums_of(study)), plan.data())
+    fit = fit_slopes(Slopes.of(study, drums_of(study)), drum_plan.data())
     made, table = write_search(tmp_path, study, fit)
     search = load_study(made)
     assert [factor.name for factor in search.factors] == ["mu", "mu_r"]
     assert read_measured(table, search).observables == ("dynamic_angle",)
-    walls = {name: search.case({}, 1, name).grain_wall.static_friction for name in plan.SHELLS}
+    walls = {name: search.case({}, 1, name).grain_wall.static_friction for name in drum_plan.SHELLS}
     assert len(set(walls.values())) == 4
 
 
 def test_the_heap_is_of_thirty_grams():
-    for scale in plan.RUNS:
-        plan.heap_study_at(scale).case({}, 0)
-    case = plan.heap_study_at("h200").case({}, 0)
+    for scale in drum_plan.RUNS:
+        drum_plan.heap_study_at(scale).case({}, 0)
+    case = drum_plan.heap_study_at("h200").case({}, 0)
     mass = case.scene.grain_count * case.grain_material.density * case.grains.mean(lambda shape: shape.volume)
     assert mass == pytest.approx(0.030, rel=0.02)
 
 
 def test_an_unknown_scale_is_refused(tmp_path):
     with pytest.raises(InputError, match="the scale is one of h200, bench"):
-        campaign.run_study("paper", tmp_path)
+        drum_campaign.run_study("paper", tmp_path)
 
 
 @pytest.mark.parametrize("study_app", [cellulose_app, wheat_app])

@@ -11,7 +11,7 @@ import pytest
 from doe.discrepancy import Bank, Outcomes, Point
 from experiments.discover.search import Search
 from experiments.evidence.trials.confirm import differing, points_of
-from experiments.evidence.trials.generate import STUDY, bank_beside
+from experiments.evidence.trials.generate_trials import STUDY, bank_beside
 from experiments.io.errors import InputError
 from experiments.studyfile import load_study
 

@@ -12,13 +12,13 @@ from dem_warp import Case
 from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.jkr import JKR
 from dem_warp.materials import tsuji_damping
-from experiments.evidence.trials.drawing import Plan
-from experiments.evidence.trials.generate import STUDY
-from experiments.evidence.trials.other_codes.effects import SLIPPERY, STRANGERS
-from experiments.evidence.trials.other_codes.generate import plan_for
-from experiments.evidence.trials.other_codes.lammps_input import lammps_files, surface_energy
+from experiments.evidence.trials.generate_trials import STUDY
+from experiments.evidence.trials.other_codes.code_effects import SLIPPERY, STRANGERS
+from experiments.evidence.trials.other_codes.code_surfaces import Bench
+from experiments.evidence.trials.other_codes.generate_other import plan_for
+from experiments.evidence.trials.other_codes.lammps_trials import lammps_files, surface_energy
 from experiments.evidence.trials.other_codes.setting import Setting
-from experiments.evidence.trials.other_codes.surfaces import Bench
+from experiments.evidence.trials.truths import Plan
 from experiments.io.errors import InputError
 from experiments.studyfile import load_study
 
@@ -94,7 +94,7 @@ def test_dmt_parts_spheres_as_hard_as_jkr() -> None:
 
 def test_lammps_refuses_liquid_bridges_by_name() -> None:
     bridge = CapillaryBridge(between="grains", surface_tension=0.01, bridge_volume=5e-11)
-    with pytest.raises(InputError, match=r"no liquid bridges, which LAMMPS does not make .*capillary"):
+    with pytest.raises(InputError, match=r"LAMMPS has no liquid bridges, got capillary"):
         lammps_text(replace(case_of(), mechanisms=(bridge,)))
     with pytest.raises(InputError, match=r"lammps makes contact_adhesion, .*liquid_bridges"):
         plan_for("lammps", Plan(mechanisms=("liquid_bridges",)))

@@ -6,15 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import experiments.evidence.trials
 from dem_warp import PRESETS
 from doe.discrepancy import Point
 from experiments.cases import OwnWorkers
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
-from experiments.evidence.trials.generate import STUDY
-from experiments.evidence.trials.other_codes.conventions import (
+from experiments.evidence.trials.generate_trials import STUDY
+from experiments.evidence.trials.other_codes.convention_effects import (
     ERROR,
     OFF,
     OtherWorkshop,
@@ -22,11 +21,9 @@ from experiments.evidence.trials.other_codes.conventions import (
     made_offsets,
     parted,
 )
-from experiments.evidence.trials.other_codes.offsets import measured_offsets, offsets_table
+from experiments.evidence.trials.other_codes.offsets import offsets_table
 from experiments.evidence.trials.truth import Kind, Label
 from experiments.studyfile import load_study
-
-RECORD = Path(experiments.evidence.trials.__file__).parent / "record" / "liggghts"
 
 
 def test_a_drawn_offset_comes_back_with_its_error() -> None:
@@ -41,15 +38,6 @@ def test_a_drawn_offset_comes_back_with_its_error() -> None:
     assert table.loc["flank_angle", "off"] == pytest.approx(1.0, abs=0.14)
     assert list(table["unit"]) == ["deg", "s"]
     assert table.loc["t55", table.columns[-1]] == pytest.approx(0.3, rel=0.1)
-
-
-def test_heaps_of_liggghts_run_out_later_than_ours() -> None:
-    table, nulls = measured_offsets(RECORD)
-    late = table.set_index("observable").loc["t55"]
-    assert nulls == 25
-    # 4 ms in 270, less than a film's frame; seven standard errors
-    assert 3.0 < late["off, sd of one run"] / late["standard error"] < 15.0
-    assert 1e-3 < late["off"] < 1e-2
 
 
 def test_what_laws_make_is_told_from_what_is_left() -> None:

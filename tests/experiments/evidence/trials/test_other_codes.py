@@ -20,24 +20,24 @@ from doe.discrepancy import Point
 from experiments.cases import OwnWorkers
 from experiments.cases.engines.program import AnswerError
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.evidence.trials.drawing import Plan
-from experiments.evidence.trials.generate import STUDY
-from experiments.evidence.trials.other_codes.effects import DECLARED, STRANGERS
-from experiments.evidence.trials.other_codes.generate import PLAN, in_turn, plan_for, write_reality
-from experiments.evidence.trials.other_codes.liggghts_input import energy_density, liggghts_files, wetting
-from experiments.evidence.trials.other_codes.making import MADE
-from experiments.evidence.trials.other_codes.program import CODES, engine_for
-from experiments.evidence.trials.other_codes.reading import (
+from experiments.evidence.trials.generate_trials import STUDY
+from experiments.evidence.trials.other_codes.code_effects import DECLARED, STRANGERS
+from experiments.evidence.trials.other_codes.code_process import CODES, engine_for
+from experiments.evidence.trials.other_codes.code_simulator import OtherCodeSimulator
+from experiments.evidence.trials.other_codes.code_surfaces import Bench
+from experiments.evidence.trials.other_codes.dump_reading import (
     Frame,
     Grasp,
     filmed_observables,
     read_balance,
     read_film,
 )
+from experiments.evidence.trials.other_codes.generate_other import PLAN, in_turn, plan_for, write_reality
+from experiments.evidence.trials.other_codes.liggghts_trials import energy_density, liggghts_files, wetting
+from experiments.evidence.trials.other_codes.making import MADE
 from experiments.evidence.trials.other_codes.setting import Setting
-from experiments.evidence.trials.other_codes.simulator import OtherCodeSimulator
-from experiments.evidence.trials.other_codes.surfaces import Bench
 from experiments.evidence.trials.truth import Kind, Label
+from experiments.evidence.trials.truths import Plan
 from experiments.io.errors import InputError
 from experiments.studyfile import load_study
 from experiments.studyfile.observables import NAMES, OUTLINE

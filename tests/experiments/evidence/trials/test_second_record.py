@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import zipfile
+import io
+import tarfile
 from pathlib import Path
 
 import pytest
@@ -10,16 +11,14 @@ from typer.testing import CliRunner
 
 from doe.discrepancy import Settings, Verdict
 from experiments.evidence.trials.declaration import Declaration
-from experiments.evidence.trials.drawing import Declared, Plan
 from experiments.evidence.trials.findings import EVERYTHING, Finding, findings_table, write_findings
-from experiments.evidence.trials.folder import HEAPS, LABELS, PAGE, REALITY, Folder
-from experiments.evidence.trials.heaps import unpack_heaps
-from experiments.evidence.trials.kept import read_record
-from experiments.evidence.trials.other_codes.compare import write_comparison
-from experiments.evidence.trials.other_codes.generate import app, write_reality
-from experiments.evidence.trials.record import gather
-from experiments.evidence.trials.run import open_jobs
-from experiments.evidence.trials.trials_page import write_trials_page
+from experiments.evidence.trials.other_codes.compare_codes import write_comparison
+from experiments.evidence.trials.other_codes.generate_other import app, write_reality
+from experiments.evidence.trials.record_trials import gather
+from experiments.evidence.trials.run_trials import open_jobs
+from experiments.evidence.trials.trial_heaps import unpack_heaps
+from experiments.evidence.trials.trials_folder import HEAPS, LABELS, PAGE, REALITY, Folder
+from experiments.evidence.trials.trials_page import read_record, write_trials_page
 from experiments.evidence.trials.truth import (
     Kind,
     Label,
@@ -29,6 +28,7 @@ from experiments.evidence.trials.truth import (
     write_labels,
     write_sealed,
 )
+from experiments.evidence.trials.truths import Declared, Plan
 from experiments.io.errors import InputError
 
 ANALYSED, MEASURED, UNTOUCHED = "alone-001", "alone-002", "alone-003"
@@ -113,13 +113,15 @@ def test_a_record_can_be_gone_on_from_elsewhere(folder: Folder, tmp_path: Path) 
 
 def test_an_archive_of_anything_else_is_refused(folder: Folder, tmp_path: Path) -> None:
     archive = tmp_path / HEAPS
-    archive.write_bytes(b"PK\3\4 no archive")
+    archive.write_bytes(b"\xfd7zXZ no archive")
     with pytest.raises(InputError, match="must be an archive"):
         unpack_heaps(archive, folder)
     for name, size in (("../alone-001.csv", 5), (f"{ANALYSED}.csv", 2_000_000)):
-        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as packed:
-            packed.writestr(name, b"0" * size)
-        with pytest.raises(InputError, match="heaps of sealed trials alone"):
+        with tarfile.open(archive, "w:xz") as packed:
+            entry = tarfile.TarInfo(name)
+            entry.size = size
+            packed.addfile(entry, io.BytesIO(b"0" * size))
+        with pytest.raises(InputError, match="only heaps of sealed trials"):
             unpack_heaps(archive, folder)
     assert folder.measured(ANALYSED).read_text().startswith("condition")
 

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from doe.discrepancy import Settings, Verdict
+from experiments.evidence.trials import trials_page
 from experiments.evidence.trials.declaration import Declaration
-from experiments.evidence.trials.drawing import Declared, Plan
 from experiments.evidence.trials.findings import (
     EVERYTHING,
     PHOTOGRAPHS,
@@ -19,8 +19,7 @@ from experiments.evidence.trials.findings import (
     read_findings,
     write_findings,
 )
-from experiments.evidence.trials.folder import Folder
-from experiments.evidence.trials.record import gather
+from experiments.evidence.trials.record_trials import gather
 from experiments.evidence.trials.score import (
     Share,
     aims,
@@ -33,11 +32,13 @@ from experiments.evidence.trials.score import (
     scored,
     unknown_area,
 )
+from experiments.evidence.trials.trials_folder import Folder
 from experiments.evidence.trials.trials_page import write_trials_page
 from experiments.evidence.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
+from experiments.evidence.trials.truths import Declared, Plan
 from experiments.io.errors import InputError
 
-KEPT = Path(__file__).parents[4] / "experiments" / "evidence" / "trials" / "record" / "sixth"
+RECORDS = Path(trials_page.__file__).with_name("record")
 
 
 def label_of(kind: Kind, *names: str, multiple: float = 2.0) -> Label:
@@ -226,11 +227,11 @@ def test_findings_without_a_misfit_are_read_as_older_ones(tmp_path: Path) -> Non
     assert old["misfit"].isna().all()
 
 
-def test_the_kept_record_scores_as_its_page_says(tmp_path: Path) -> None:
-    # The sixth; the fifth was declared before the rules had `finish_points`, so its hash is another.
-    shutil.copytree(KEPT, tmp_path / "sixth")
-    page = write_trials_page(tmp_path / "sixth")
-    assert page.read_text(encoding="utf-8") == (KEPT / "README.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("series", ["eleventh", "twelfth", "seventeenth"])
+def test_a_kept_record_scores_as_its_page_says(series: str, tmp_path: Path) -> None:
+    shutil.copytree(RECORDS / series, tmp_path / series)
+    page = write_trials_page(tmp_path / series)
+    assert page.read_text(encoding="utf-8") == (RECORDS / series / "README.md").read_text(encoding="utf-8")
 
 
 def test_trials_that_have_not_run_leave_a_record_as_it_is(tmp_path: Path) -> None:

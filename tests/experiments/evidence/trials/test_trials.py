@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,6 +25,16 @@ from doe.discrepancy import (
     Verdict,
 )
 from doe.discrepancy.contest.power import CODED_SIZES
+from experiments.evidence.trials.analyses import (
+    Analyses,
+    OutOfTime,
+    TimedSimulator,
+    TrialAnalyses,
+    analysis_name,
+    analysis_processes,
+    in_step,
+    keep,
+)
 from experiments.evidence.trials.declaration import (
     Declaration,
     declared_effect,
@@ -32,13 +42,10 @@ from experiments.evidence.trials.declaration import (
     read_declaration,
     with_names,
 )
-from experiments.evidence.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep
-from experiments.evidence.trials.drawing import STRONG, Declared, Plan, draw
-from experiments.evidence.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
-from experiments.evidence.trials.folder import Folder
-from experiments.evidence.trials.heaps import cases_of
-from experiments.evidence.trials.lockstep import Crash, LocalCrew, Step, in_step, process_crew
-from experiments.evidence.trials.run import chosen
+from experiments.evidence.trials.findings import EVERYTHING, PHOTOGRAPHS, Crash, read_findings
+from experiments.evidence.trials.run_trials import chosen
+from experiments.evidence.trials.trial_heaps import cases_of
+from experiments.evidence.trials.trials_folder import Folder
 from experiments.evidence.trials.truth import (
     Kind,
     Label,
@@ -49,6 +56,7 @@ from experiments.evidence.trials.truth import (
     write_labels,
     write_sealed,
 )
+from experiments.evidence.trials.truths import STRONG, Declared, Plan, draw
 from experiments.io.errors import InputError
 
 FACTORS = (Factor("mu", 0.2, 0.6), Factor("e", 0.1, 0.5))
@@ -219,65 +227,22 @@ def expected_reason(number: int) -> str:
     return str([[[float(number), float(seed)] for seed in range(wave + 1)] for wave in range(number)])
 
 
-@pytest.mark.parametrize("crew", ["local", "processes"])
-def test_waves_of_many_analyses_run_in_one_call_and_come_home(crew: str) -> None:
+@pytest.mark.parametrize("where", ["here", "processes"])
+def test_batches_of_many_analyses_run_in_one_call(where: str) -> None:
     simulator, names = Echo(), ["3", "1", "0", "2"]
-    if crew == "local":
-        rounds = list(in_step(names, LocalCrew(counting), simulator))
+    if where == "here":
+        rounds = list(in_step(names, Analyses(counting), simulator))
     else:
-        with process_crew(counting, workers=2) as processes:
-            rounds = list(in_step(names, processes, simulator))
-    # The shifts are 3 with 0, and 1 with 2.
-    assert simulator.calls == 5
-    seen = [(turn.running, turn.cases) for turn in rounds]
-    assert seen == [(1, 1), (2, 2), (1, 2), (1, 2), (1, 3), (0, 0), (0, 0)]
+        with analysis_processes(counting, workers=2) as advance:
+            rounds = list(in_step(names, advance, simulator))
+    assert simulator.calls == 3
+    assert [(turn.running, turn.cases) for turn in rounds] == [(3, 3), (2, 4), (1, 3), (0, 0)]
     found = {name: end for turn in rounds for name, end in turn.ended.items()}
     assert isinstance(found["0"], Crash)
     assert found["0"].traceback.endswith("ValueError: no waves\n")
     for name in ("1", "2", "3"):
         assert isinstance(found[name], Discovery)
         assert found[name].reason == expected_reason(int(name))
-
-
-def test_one_shift_calculates_while_the_waves_of_the_other_run() -> None:
-    """Every call of the simulator finds the other shift at work, until that has ended."""
-    events: list[str] = []
-
-    class Watched(LocalCrew):
-        def send(self, answers: Mapping[str, Outcomes | None]) -> None:
-            events.append("+".join(answers))
-            super().send(answers)
-
-        def collect(self) -> dict[str, Step]:
-            events.append("collect")
-            return super().collect()
-
-    class Watching(Echo):
-        def __call__(self, points: Sequence[Point]) -> Outcomes:
-            events.append("run")
-            return super().__call__(points)
-
-    list(in_step(["2", "1"], Watched(counting), Watching()))
-    assert events == [
-        *("2", "collect", "1", "run", "collect", "2", "run", "collect", "1", "run"),
-        *("collect", "2", "collect", "", ""),
-    ]
-
-
-def test_what_the_other_shift_found_is_not_lost_when_the_time_is_up() -> None:
-    class TimeIsUp(Echo):
-        def __call__(self, points: Sequence[Point]) -> Outcomes:
-            raise OutOfTime
-
-    found: dict[str, Discovery | Crash] = {}
-
-    def run() -> None:
-        for turn in in_step(["3", "0"], LocalCrew(counting), TimeIsUp()):
-            found.update(turn.ended)
-
-    with pytest.raises(OutOfTime):
-        run()
-    assert list(found) == ["0"]
 
 
 def test_a_batch_after_the_deadline_is_not_begun() -> None:
@@ -343,7 +308,7 @@ def test_trials_of_a_known_world_end_as_they_should(tmp_path: Path) -> None:
         "alone-002": {"beta": 1.0},
         "outside-001": {"beta": 1.0},
     }
-    desk = Desk(
+    begin = TrialAnalyses(
         synthetic.emulator(),
         Settings(draws=500, resolvable=("beta", "gamma")),
         {
@@ -354,8 +319,8 @@ def test_trials_of_a_known_world_end_as_they_should(tmp_path: Path) -> None:
     )
     simulator = synthetic.SyntheticSimulator(synthetic.space())
     folder = Folder(tmp_path)
-    jobs = [job_name(trial, EVERYTHING) for trial in hidden] + [job_name("alone-002", PHOTOGRAPHS)]
-    for turn in in_step(jobs, LocalCrew(desk), simulator):
+    jobs = [analysis_name(trial, EVERYTHING) for trial in hidden] + [analysis_name("alone-002", PHOTOGRAPHS)]
+    for turn in in_step(jobs, Analyses(begin), simulator):
         keep(folder, turn.ended)
     found = read_findings([folder.findings]).set_index(["trial", "view"])
     assert found["verdict"].to_dict() == {

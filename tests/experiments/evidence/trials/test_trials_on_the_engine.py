@@ -11,13 +11,12 @@ from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
 from experiments.discover.search import Search
+from experiments.evidence.trials.analyses import Analyses, TrialAnalyses, read_data
 from experiments.evidence.trials.declaration import Declaration
-from experiments.evidence.trials.desk import Desk, read_data
-from experiments.evidence.trials.drawing import Plan
-from experiments.evidence.trials.folder import Folder
-from experiments.evidence.trials.generate import STUDY, bank_beside, generators_study, measure_trials
-from experiments.evidence.trials.lockstep import LocalCrew
+from experiments.evidence.trials.generate_trials import STUDY, bank_beside, generators_study, measure_trials
+from experiments.evidence.trials.trials_folder import Folder
 from experiments.evidence.trials.truth import Kind, Label, Sealed
+from experiments.evidence.trials.truths import Plan
 from experiments.studyfile import load_study
 from experiments.studyfile.observables import NAMES, OUTLINE
 
@@ -70,10 +69,9 @@ def test_only_the_hidden_effect_makes_the_analysis_ask_for_runs(measured: dict[s
     search = Search.of(load_study(STUDY, BENCH))
     emulator = fit_emulator(search.read_bank(bank_beside(BENCH)))
     withheld: dict[str, tuple[str, ...]] = dict.fromkeys(measured, ())
-    crew = LocalCrew(Desk(emulator, search.settings, measured, withheld))
+    advance = Analyses(TrialAnalyses(emulator, search.settings, measured, withheld))
     jobs = {label: f"{label.trial}.everything" for label in (NULL, ROLLING)}
-    crew.send(dict.fromkeys(jobs.values()))
-    steps = crew.collect()
+    steps = advance(dict.fromkeys(jobs.values()))
     none, wave = steps[jobs[NULL]], steps[jobs[ROLLING]]
     assert isinstance(none, Discovery)
     assert none.verdict is Verdict.NONE

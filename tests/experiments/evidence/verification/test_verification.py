@@ -12,6 +12,15 @@ import typer
 from dem_warp.clumps import ClumpShape
 from dem_warp.laws.micro_slip import MicroSlip
 from experiments.evidence.verification import __main__ as verification
+from experiments.evidence.verification.check import (
+    Curve,
+    Plot,
+    Result,
+    Row,
+    absolute_row,
+    order_row,
+    relative_row,
+)
 from experiments.evidence.verification.problems import chung_ooi
 from experiments.evidence.verification.problems.contact_ode import solve_impact
 from experiments.evidence.verification.problems.deme_contacts import deme_contacts
@@ -21,15 +30,6 @@ from experiments.evidence.verification.problems.impact import Impact, Partner, s
 from experiments.evidence.verification.problems.one_spring import BASE, one_spring_rebound
 from experiments.evidence.verification.problems.partial_slip import rebound_slip
 from experiments.evidence.verification.problems.setups import CLUMP
-from experiments.evidence.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    order_row,
-    relative_row,
-)
 
 LABELS = ("problem", "case", "quantity", "reference")
 

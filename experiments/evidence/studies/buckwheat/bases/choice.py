@@ -21,9 +21,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from doe import Agreement
+from experiments.evidence.studies.buckwheat.bases.base_heaps import Folder, angle_column
 from experiments.evidence.studies.buckwheat.bases.grid import Base, bases, grid
-from experiments.evidence.studies.buckwheat.bases.simulation import Folder, angle_column
-from experiments.evidence.studies.buckwheat.sensitivity.folder import SETTINGS
+from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import SETTINGS
 from experiments.studies.buckwheat.replay.replay import Replay
 from experiments.studies.buckwheat.replay.runs import DESIGNS
 

@@ -20,9 +20,9 @@ from typing import Annotated
 
 import typer
 
+from experiments.evidence.studies.buckwheat.bases.base_heaps import Folder
 from experiments.evidence.studies.buckwheat.bases.grid import bases
-from experiments.evidence.studies.buckwheat.bases.simulation import Folder
-from experiments.evidence.studies.buckwheat.sensitivity.folder import SETTINGS
+from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import SETTINGS
 from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
 from experiments.io.files import copy_file, write_text
 from experiments.report.material_card import CARD

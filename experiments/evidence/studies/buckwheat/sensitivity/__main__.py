@@ -18,8 +18,8 @@ import typer
 
 from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.commands.options import OneDevice
-from experiments.evidence.studies.buckwheat.sensitivity.folder import open_settings
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
+from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import open_settings
 from experiments.evidence.studies.buckwheat.sensitivity.variants import BASE, Variant, chosen_variants
 from experiments.io.files import write_text
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.evidence.studies.buckwheat.sensitivity.folder import SETTINGS
+from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import SETTINGS
 from experiments.evidence.studies.buckwheat.sensitivity.variants import BASE, variants
 from experiments.studies.buckwheat.replay.replay import LEAST_RUNS, Replay
 from experiments.studies.buckwheat.replay.runs import DESIGNS

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from experiments.evidence.trials.baselines.methods.contest import judged, prior_of_one
-from experiments.evidence.trials.baselines.methods.evidence import log_evidence
+from experiments.evidence.trials.baselines.methods.model_evidence import log_evidence
 from experiments.evidence.trials.baselines.protocol import ODDS, Answer, Problem
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from experiments.evidence.trials.baselines import benchmark_files, record, run
+from experiments.evidence.trials.baselines import benchmark_files, record_methods, run_methods
 from experiments.evidence.trials.baselines.answers_table import add_answer, file_of, read_answers
 from experiments.evidence.trials.baselines.benchmark_files import (
     Benchmark,
@@ -18,7 +18,9 @@ from experiments.evidence.trials.baselines.benchmark_files import (
     load_benchmark,
     write_benchmark,
 )
-from experiments.evidence.trials.baselines.compare import (
+from experiments.evidence.trials.baselines.draw import round_of
+from experiments.evidence.trials.baselines.method_list import ALONE, methods
+from experiments.evidence.trials.baselines.method_tables import (
     Paired,
     Parts,
     areas,
@@ -30,12 +32,10 @@ from experiments.evidence.trials.baselines.compare import (
     power,
     summary,
 )
-from experiments.evidence.trials.baselines.draw import round_of
-from experiments.evidence.trials.baselines.library import ALONE, methods
 from experiments.evidence.trials.baselines.protocol import Answer
-from experiments.evidence.trials.drawing import STRONG, Declared
-from experiments.evidence.trials.roc import auroc
+from experiments.evidence.trials.score import auroc
 from experiments.evidence.trials.truth import Kind, Label, write_labels
+from experiments.evidence.trials.truths import STRONG, Declared
 from experiments.io.errors import InputError
 from experiments.report.kit.markdown import markdown_table
 
@@ -122,8 +122,8 @@ def test_a_round_has_every_kind_and_sizes_within_the_ranges() -> None:
 
 def test_the_command_goes_on_where_it_stopped(tmp_path: Path) -> None:
     command = [str(tmp_path), "--methods", "discrepancy", "--count"]
-    app = run.typer.Typer()
-    app.command()(run.main)
+    app = run_methods.typer.Typer()
+    app.command()(run_methods.main)
     for count in ("1", "2"):
         done = CliRunner().invoke(app, [*command, count])
         assert done.exit_code == 0, done.output
@@ -170,7 +170,7 @@ def _kept(folder: Path) -> None:
 
 def test_answers_are_judged_by_what_is_hidden(tmp_path: Path) -> None:
     _kept(tmp_path)
-    table = record.read_record(tmp_path)
+    table = record_methods.read_record(tmp_path)
     good, poor = (rows.set_index("trial") for _, rows in table.groupby("method", sort=False))
     assert list(good.index[good["right"]]) == ["n", "s", "p", "o"]
     assert not good["wrong"].any()
@@ -222,7 +222,7 @@ def test_sizes_that_differ_are_classed(tmp_path: Path) -> None:
 def test_records_within_a_record_stand_beside_it(tmp_path: Path) -> None:
     _kept(tmp_path)
     _kept(tmp_path / "other")
-    page = record.write_methods_page(tmp_path).read_text(encoding="utf-8")
+    page = record_methods.write_methods_page(tmp_path).read_text(encoding="utf-8")
     beside = page[page.index("## On other heaps") :]
     first = "0 of 1 | 1 of 1 | 1 of 1 | 1 of 1 | 0 of 5 | 1.000 | 1.000 |  |"
     for heaps in ("emulated", "[other](other/README.md)"):
@@ -235,7 +235,7 @@ def test_records_within_a_record_stand_beside_it(tmp_path: Path) -> None:
 
 def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
     _kept(tmp_path)
-    page = record.write_methods_page(tmp_path).read_text(encoding="utf-8")
+    page = record_methods.write_methods_page(tmp_path).read_text(encoding="utf-8")
     assert "5 trials that every method has answered" in page
     assert "| BIC | 1 of 1 |" in page
     assert {path.name for path in tmp_path.glob("*.png")} == {"roc.png", "power.png"}
@@ -269,10 +269,10 @@ def test_the_kept_record_is_of_the_released_trials_and_its_page_says_what_its_fi
         if file.is_file() and file.suffix != ".png":
             (tmp_path / file.relative_to(KEPT)).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / file.relative_to(KEPT)).write_bytes(file.read_bytes())
-    table = record.read_record(tmp_path)
+    table = record_methods.read_record(tmp_path)
     assert set(table["trial"]) <= set(load_answers())
     assert list(dict.fromkeys(table["method"])) == ["search", *methods(None)]
-    written = record.write_methods_page(tmp_path).read_text(encoding="utf-8")
+    written = record_methods.write_methods_page(tmp_path).read_text(encoding="utf-8")
     assert written == (KEPT / "README.md").read_text(encoding="utf-8")
     released = (benchmark_files.FOLDER / "README.md").read_text(encoding="utf-8")
     assert markdown_table(summary(table)).strip() in released

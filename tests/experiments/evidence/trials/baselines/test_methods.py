@@ -14,12 +14,12 @@ from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, emulator, measure
 
 from doe.discrepancy.fitting.model_fit import weigh
 from doe.errors import RuleError
-from experiments.evidence.trials.baselines.library import ALONE, installed, methods
+from experiments.evidence.trials.baselines.method_list import ALONE, installed, methods
 from experiments.evidence.trials.baselines.methods import discrepancy, inference
 from experiments.evidence.trials.baselines.methods.contest import judged, prior_of_one
-from experiments.evidence.trials.baselines.methods.evidence import log_evidence, smc
 from experiments.evidence.trials.baselines.methods.lasso import selected
 from experiments.evidence.trials.baselines.methods.mmd import misspecified
+from experiments.evidence.trials.baselines.methods.model_evidence import log_evidence, smc
 from experiments.evidence.trials.baselines.protocol import Answer, Problem
 from experiments.io.errors import InputError
 
@@ -31,17 +31,17 @@ EVERY = [SBI if name == "sbi" else name for name in methods(None)]
 
 @pytest.fixture(scope="module")
 def nothing() -> Problem:
-    return Problem(measure({}, 5), "expected nothing", KNOWN, SETTINGS, 1)
+    return Problem("nothing", KNOWN, measure({}, 5), SETTINGS, 1)
 
 
 @pytest.fixture(scope="module")
 def strong() -> Problem:
-    return Problem(measure({"beta": 1.2}, 3), "expected strong", KNOWN, SETTINGS, 2)
+    return Problem("strong", KNOWN, measure({"beta": 1.2}, 3), SETTINGS, 2)
 
 
 @pytest.fixture(scope="module")
 def foreign() -> Problem:
-    return Problem(measure({"beta": 2.0}, 3), "expected foreign", KNOWN.without("beta"), SETTINGS, 3)
+    return Problem("foreign", KNOWN.without("beta"), measure({"beta": 2.0}, 3), SETTINGS, 3)
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -69,7 +69,7 @@ def test_what_the_library_lacks_is_not_named_alone(name: str, foreign: Problem) 
 def test_a_discrepancy_is_seen_and_its_score_grows_with_the_effect() -> None:
     method = methods(None)["discrepancy"]
     answers = [
-        method(Problem(measure({"beta": size}, 3), str(size), KNOWN, SETTINGS, 4)) for size in (0.0, 0.6, 2.0)
+        method(Problem(str(size), KNOWN, measure({"beta": size}, 3), SETTINGS, 4)) for size in (0.0, 0.6, 2.0)
     ]
     assert [answer.alarm for answer in answers] == [False, True, True]
     scores = [answer.score for answer in answers]
@@ -236,7 +236,7 @@ def test_an_answer_without_an_alarm_says_nothing_more() -> None:
 
 def test_a_method_sees_neither_withheld_mechanisms_nor_values_that_were_not_measured() -> None:
     measured = measure({}, 5, conditions=CONDITIONS[:3]).only(OBSERVABLES[:6])
-    problem = Problem(measured, "expected part", KNOWN.without("alpha"), SETTINGS, 1)
+    problem = Problem("part", KNOWN.without("alpha"), measured, SETTINGS, 1)
     assert problem.singles == (("beta",), ("gamma",))
     assert len(problem.fitted().covariance) == 18
     with pytest.raises(RuleError):

@@ -1,1 +1,0 @@
-"""Campaigns on a real batch system: one node of SLURM on this machine."""

@@ -1,1 +1,0 @@
-"""Faults by doing them: runs that are killed, disks that are full, two runs in one folder."""

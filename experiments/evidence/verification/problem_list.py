@@ -1,0 +1,44 @@
+"""Problems of the verification: each is one file of `problems` and one line here."""
+
+from experiments.evidence.verification.check import Problem
+from experiments.evidence.verification.problems.beverloo import beverloo
+from experiments.evidence.verification.problems.deme_contacts import deme_contacts
+from experiments.evidence.verification.problems.energy import energy
+from experiments.evidence.verification.problems.friction_and_rolling import friction_and_rolling
+from experiments.evidence.verification.problems.heap_angle import heap_angle
+from experiments.evidence.verification.problems.janssen import janssen
+from experiments.evidence.verification.problems.lammps_contacts import lammps_contacts
+from experiments.evidence.verification.problems.liggghts_clumps import liggghts_clumps
+from experiments.evidence.verification.problems.liggghts_contacts import liggghts_contacts
+from experiments.evidence.verification.problems.micro_slip_path import micro_slip
+from experiments.evidence.verification.problems.normal_impact import elastic_impact, restitution
+from experiments.evidence.verification.problems.oblique_impact import oblique_impact, spinning_impact
+from experiments.evidence.verification.problems.rigid_body import rigid_body
+from experiments.evidence.verification.problems.stability import stability
+from experiments.evidence.verification.problems.yade_contacts import yade_contacts
+
+PROBLEMS: dict[str, Problem] = {
+    "elastic-impact": elastic_impact,
+    "restitution": restitution,
+    "oblique-impact": oblique_impact,
+    "micro-slip": micro_slip,
+    "spinning-impact": spinning_impact,
+    "friction-and-rolling": friction_and_rolling,
+    "rigid-body": rigid_body,
+    "liggghts-contacts": liggghts_contacts,
+    "liggghts-clumps": liggghts_clumps,
+    "lammps-contacts": lammps_contacts,
+    "yade-contacts": yade_contacts,
+    "deme-contacts": deme_contacts,
+    "energy": energy,
+    "janssen": janssen,
+    "beverloo": beverloo,
+    "heap-angle": heap_angle,
+    "stability": stability,
+}
+
+PEERS = ("liggghts-contacts", "liggghts-clumps", "lammps-contacts", "yade-contacts", "deme-contacts")
+"""Problems that run another code, which must be installed."""
+
+HEAVY = ("beverloo", "heap-angle", "stability", *PEERS)
+"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores, or another code."""
