@@ -208,7 +208,7 @@ def test_the_shipped_bank_knows_what_made_it() -> None:
 
 def test_a_bank_from_before_an_effect_saturated_is_read_with_the_same_sizes(tmp_path: Path) -> None:
     search, path = Search.of(load_study(TRIAL)), tmp_path / "older.npz"
-    settings = replace(search.settings, bank_points=1, bank_repeats=1, bank_mechanism_points=1)
+    settings = replace(search.settings, bank_points=10, bank_mechanism_points=10)
     points = bank_points(search.space, settings)
     outcomes = Outcomes(np.ones((len(points), 1)), ("",) * len(points))
     made = make_bank(search.space, ("flank_angle",), points, outcomes, search.fingerprint)

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mutations import mutated
 
-from experiments.evidence.robustness.fuzz.mutations import mutated
 from experiments.evidence.robustness.fuzz.readers import CORPUS, READERS, Reader, accepted_change
 
 INPUTS = int(os.environ.get("FUZZ_INPUTS", "40"))
