@@ -210,8 +210,8 @@ def test_a_bank_from_before_an_effect_saturated_is_read_with_the_same_sizes(tmp_
     search, path = Search.of(load_study(TRIAL)), tmp_path / "older.npz"
     settings = replace(search.settings, bank_points=10, bank_mechanism_points=10)
     points = bank_points(search.space, settings)
-    outcomes = Outcomes(np.ones((len(points), 1)), ("",) * len(points))
-    made = make_bank(search.space, ("flank_angle",), points, outcomes, search.fingerprint)
+    outcomes = Outcomes(np.ones((len(points), len(NAMES))), ("",) * len(points))
+    made = make_bank(search.space, NAMES, points, outcomes, search.fingerprint)
     before = made.saturating({"plate_roughness": None})
     before.save(path)
     read = search.read_bank(path)
