@@ -26,7 +26,7 @@ def in_words(parameter: str) -> str:
 
 def main(card_file: Path, picture: Path) -> None:
     """Fit the card's surface again, and draw where it agrees with the measured angle."""
-    _, card = read_toml(card_file, "the card")
+    _, card = read_toml(card_file)
     name, surface = next(iter(card_surfaces(card, card_file).items()))
     goal = card["fitted"]["response"][name]
     mean, sd = (float(str(goal[key]).split()[0]) for key in ("mean", "sd"))

@@ -43,7 +43,7 @@ def read_source(path: Path) -> Source:
         When the file is no card, a bridge has written it, it has no surface, or several responses were
         matched together.
     """
-    _, card = read_toml(path, "a material card")
+    _, card = read_toml(path)
     own = load_card(path)
     if BRIDGE in card:
         rule = "expected a bridge starts from a card that dem-warp calibrate wrote, not from one that is corrected"

@@ -154,10 +154,10 @@ def too_many_failed(cases: pd.DataFrame, stage: str, need: str, response: Respon
         reason += f" The reason of {count} of them: {shortened(told, LONGEST_REASON).rstrip('.')}."
     if not told or "time limit" in told:
         reason += (
-            " See the reasons in the table of cases, then widen the time limit or narrow the factors' ranges."
+            " See the reasons in the case table, then widen the time limit or narrow the factors' ranges."
         )
     else:
         # where every case fails alike, other ranges do not help
         way = "" if count == (cases["scene"] == response.scene).sum() else ", or narrow the factors' ranges"
-        reason += f" Mend that{way}; the table of cases has every reason."
+        reason += f" Fix this{way}; the case table lists every reason."
     return StageEnd(Outcome.TOO_MANY_FAILED_RUNS, reason)

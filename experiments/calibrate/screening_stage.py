@@ -34,8 +34,7 @@ def screening_design(factors: Sequence[Factor], settings: ScreeningSettings) -> 
         When no design has the name, or the design does not come in so many runs.
     """
     if settings.design not in DESIGNS:
-        rule = f"campaign.screening.design: must be one of {', '.join(DESIGNS)}"
-        raise ValueError(f"{rule}, got {settings.design!r}")
+        raise ValueError(f"design must be one of {', '.join(DESIGNS)}, got {settings.design!r}")
     fewest = max(LEAST_RUNS, 4 * -(-(len(factors) + settings.dummies + 1) // 4))
     return DESIGNS[settings.design](factors, settings.runs or fewest)
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from doe import Design
 from experiments.calibrate.cases import Runner, StageEnd, with_combinations
-from experiments.calibrate.checks import check_study
+from experiments.calibrate.checks import check_calibration
 from experiments.calibrate.climb_stage import climb, require_crossing
 from experiments.calibrate.directions import with_directions
 from experiments.calibrate.noise_stage import analyse_noise_floor, plan_noise_floor
@@ -63,7 +63,7 @@ def calibrate(study: Study, runner: Runner, on_stage: StageHook | None = None) -
     ValueError
         When a setting does not fit the study's factors; nothing is simulated then.
     """
-    check_study(study)
+    check_calibration(study)
     record = _Record(runner, on_stage, study.target.responses)
     try:
         outcome, reason = _run(study, record)

@@ -166,7 +166,7 @@ def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float])
 
 
 def _read(path: Path) -> MechanismFile:
-    text, document = read_toml(path, "a mechanism of the library")
+    text, document = read_toml(path)
     return validated(MechanismFile, document, Places.read(path, text))
 
 

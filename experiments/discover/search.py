@@ -62,12 +62,10 @@ class Search:
         """
         file = str(study.file)
         if not study.factors:
-            raise StudyError(file, "a search calibrates first, so it needs at least one [[factor]]", "none")
+            raise StudyError(file, "needs at least one [[factor]], as a search calibrates first")
         if all(condition.held_out for condition in study.conditions):
             names = ", ".join(condition.name for condition in study.conditions)
-            raise StudyError(
-                file, "expected at least one condition takes part in the fit", f"held out: {names}"
-            )
+            raise StudyError(file, f"at least one condition must not be held out, got {names}")
         settings = settings_of(study.discover.settings, f"{file}: discover.settings")
         return cls(study, _wanted(study), settings)
 
@@ -128,10 +126,8 @@ class Search:
         bank, mine = _up_to_date(load_bank(path).renamed(FORMER_NAMES), self.space), self.space
         its = bank.space
         if bank.study not in ("", self.fingerprint) or its.without(*its.names) != mine.without(*mine.names):
-            rule = (
-                "must be the bank of this study, at this scale: the same grain, test, factors and conditions"
-            )
-            raise InputError(str(path), rule, "another study's")
+            problem = "is the bank of a study with another grain, test, scale, factor or condition"
+            raise InputError(str(path), problem)
         if not any(mechanism in mine.mechanisms for mechanism in its.mechanisms):
             raise InputError(str(path), "must hold a mechanism that is looked for", ", ".join(its.names))
         return bank
@@ -160,7 +156,7 @@ def _up_to_date(bank: Bank, space: SearchSpace) -> Bank:
 def _wanted(study: Study) -> tuple[MechanismFactor, ...]:
     library = {mechanism.name: mechanism for mechanism in library_for(study)}
     if not library:
-        raise StudyError(str(study.file), "a search needs a mechanism that the study can have", "none")
+        raise StudyError(str(study.file), "has room for no mechanism of the library")
     names = [FORMER_NAMES.get(name, name) for name in study.discover.mechanisms or ()]
     maxima = {FORMER_NAMES.get(name, name): size for name, size in study.discover.maxima.items()}
     for key, named in (("mechanisms", names), ("maxima", maxima)):

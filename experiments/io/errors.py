@@ -13,7 +13,7 @@ MOST_PROBLEMS = 20
 
 
 def shortened(text: str, most: int = LONGEST_VALUE) -> str:
-    """Text on one line, its middle left out where it is long, and without characters that move a cursor."""
+    """Return a text on one line, without its end where it is long and without control characters."""
     line = "".join(character if character.isprintable() else " " for character in text[: 10 * most])
     if len(text) <= most:
         return line
@@ -68,4 +68,4 @@ class StudyError(InputError):
 
 
 class StoreError(InputError):
-    """An output folder cannot be used, or a stored case is not what it should be."""
+    """An output folder cannot be used, or a stored case is damaged."""

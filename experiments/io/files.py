@@ -14,14 +14,14 @@ from pathlib import Path
 from experiments.io.errors import InputError
 
 DEVICES = {"con", "prn", "aux", "nul", *(f"{kind}{n}" for kind in ("com", "lpt") for n in range(1, 10))}
-"""Names that Windows keeps for devices, whatever their ending: a file of such a name cannot go there."""
+"""Names that Windows keeps for devices, whatever their ending."""
 
 _TEMPORARY = re.compile(r"\..+\.\d+(\.\w+)?")
 """Names that `replacing` gives."""
 
 
 def is_device_name(name: str) -> bool:
-    """Tell that a file of this name is a device on Windows."""
+    """Return whether a file of this name is a device on Windows."""
     return name.partition(".")[0].rstrip(" ").casefold() in DEVICES
 
 
@@ -31,7 +31,7 @@ def _temporary(path: Path) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Name a temporary file beside a file, and rename it over the file when the block ends without an error.
+    """Name a temporary file in the same folder, and rename it when the block ends without an error.
 
     The temporary name has the same ending. The file's folder is made when it is missing, an older file is
     replaced, and after a crash the file itself is whole or absent.
@@ -44,7 +44,7 @@ def replacing(path: Path) -> Iterator[Path]:
             os.fsync(file.fileno())
         temporary.replace(path)
     except OSError as error:
-        # that of a full disk names no file
+        # the error of a full disk names no file
         error.filename = str(path) if error.filename is None else error.filename
         raise
     finally:
@@ -52,23 +52,23 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def require_new_file(path: Path, what: str) -> None:
-    """Refuse a file that exists, or that cannot be made; nothing stays of the attempt.
+    """Refuse a file that exists or cannot be made; the attempt leaves nothing.
 
     Raises
     ------
     InputError
-        When it is one of these; the rule says what it was to be, as ``a picture``.
+        When it is one of these; the hint names its kind, e.g. ``a picture``.
     OSError
         When the disk is full.
     """
     # pathlib raises where a name is too long for the system
     if os.path.lexists(path):
-        raise InputError(str(path), f"{what} never overwrites a file", "one that exists")
+        raise InputError(str(path), "the file exists", hint=f"{what.capitalize()} never overwrites a file.")
     _require_place(path, path)
 
 
 def require_folder(path: Path) -> None:
-    """Refuse a folder that cannot be made or written to; nothing stays of the attempt.
+    """Refuse a folder that cannot be made or written to; the attempt leaves nothing.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def require_folder(path: Path) -> None:
 
 
 def _require_place(file: Path, shown: Path) -> None:
-    """Make the temporary file that `replacing` would, and the folders that it needs, and take them away."""
+    """Make the temporary file of `replacing` and the folders that it needs, and remove them."""
     made = [folder for folder in file.parents if not os.path.lexists(folder)]
     temporary = _temporary(file)
     try:
@@ -91,24 +91,24 @@ def _require_place(file: Path, shown: Path) -> None:
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise
-        rule = "must be a place that can be made and written to"
-        raise InputError(str(shown), rule, error.strerror or "none") from error
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(str(shown), f"cannot be written: {reason}") from error
     finally:
-        # the innermost first; another run may write there just now
+        # the innermost first; another run may be writing there
         for folder in made:
             with suppress(OSError):
                 folder.rmdir()
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove what a killed run had half written by `replacing` in a folder, which no other run may use."""
+    """Remove the temporary files of a killed run from a folder, which no other run may use."""
     for path in folder.rglob(".*"):
         if has_temporary_name(path) and path.is_file() and not path.is_symlink():
             path.unlink()
 
 
 def has_temporary_name(path: Path) -> bool:
-    """Tell that a file has a name that `replacing` gives while it is written."""
+    """Return whether a file has a temporary name that `replacing` gives."""
     return _TEMPORARY.fullmatch(path.name) is not None
 
 
@@ -118,42 +118,28 @@ def check_file(path: Path, largest: int) -> None:
     Raises
     ------
     OSError
-        When there is none.
+        When there is no such file.
     InputError
-        When it is no regular file, a pipe or a device for one, or has more bytes than the largest.
+        When it is not a regular file, e.g. a pipe, or has more than the largest number of bytes.
     """
     facts = path.stat()
     if not stat.S_ISREG(facts.st_mode):
-        raise InputError(str(path), "must be a regular file", "a pipe, a device or a folder")
+        raise InputError(str(path), "must be a regular file, not a pipe, a device or a folder")
     if facts.st_size > largest:
         raise InputError(str(path), f"must have at most {largest:,} bytes", f"{facts.st_size:,}")
 
 
 def read_file(path: Path, largest: int) -> bytes:
-    """Read a file that `check_file` lets pass.
-
-    Raises
-    ------
-    OSError
-        When it cannot be read.
-    InputError
-        When it is none that is read.
-    """
+    """Read a file; errors as in `check_file`."""
     check_file(path, largest)
     with path.open("rb") as file:
         return file.read(largest)
 
 
 def existing(path: Path) -> Path:
-    """Return the path of a file that must be there.
-
-    Raises
-    ------
-    InputError
-        When there is no such file.
-    """
+    """Return the path of a file that must exist, or raise `InputError`."""
     if not path.is_file():
-        raise InputError(str(path), "a folder to gather from must hold what it is named for", "no such file")
+        raise InputError(str(path), "no such file")
     return path
 
 
@@ -166,7 +152,7 @@ def copy_file(source: Path, target: Path) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write a text file in UTF-8, whole or not at all; its bytes are the same on every system.
 
-    A name of a file that the system's encoding could not read, as under ``LC_ALL=C``, goes out as it came in.
+    A file name that the system's encoding could not read, e.g. under ``LC_ALL=C``, is written as it was read.
     """
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="surrogateescape", newline="\n")

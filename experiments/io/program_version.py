@@ -1,4 +1,4 @@
-"""Version of the program, also of a checkout that nobody has installed."""
+"""Version of the program, also in a checkout that is not installed."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from typing import Any
 import dem_warp
 
 ROOT = Path(__file__).resolve().parents[2]
-"""Root of a checkout; of an installation the folder that its packages lie in."""
+"""Root of a checkout; in an installation the folder of the packages."""
 
 
 @functools.cache
 def program_version() -> str:
-    """Version that a checkout states of itself, or that of the installed package.
+    """Return the version of the checkout, or that of the installed package.
 
-    A copy of the tree on another machine has no metadata of a package, and beside a checkout another version
-    may be installed.
+    A copied tree has no package metadata, and another version may be installed next to a checkout.
     """
     try:
         project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -29,5 +28,5 @@ def program_version() -> str:
 
 
 def with_version(made_by: Mapping[str, Any]) -> dict[str, Any]:
-    """Complete an origin that this program has told of itself (`dem_warp.provenance.provenance`)."""
+    """Add this version to an origin (`dem_warp.provenance.provenance`)."""
     return {**made_by, "dem-warp": program_version()}

@@ -22,22 +22,22 @@ class Row:
     cells: Mapping[str, str]
 
     def __getitem__(self, column: str) -> str:
-        """The cell of a column; empty where the file has no such column."""
+        """Return the cell of a column; empty where the file has no such column."""
         return self.cells.get(column, "")
 
     def place(self, column: str) -> str:
         """File, line and column of a cell."""
         return f"{self.file}:{self.line}: {column}"
 
-    def error(self, rule: str, column: str) -> InputError:
-        """Build the error of a cell that breaks a rule."""
-        return InputError(self.place(column), rule, self[column] or "nothing")
+    def error(self, problem: str, column: str) -> InputError:
+        """Build the error of a cell."""
+        return InputError(self.place(column), problem, self[column] or "nothing")
 
 
 def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> Iterator[Row]:
     """Read the rows of a CSV file in UTF-8; empty rows, and rows that begin with ``#``, are skipped.
 
-    The first row names the columns: all that are needed, and of the known ones as many as it likes.
+    The first row names the columns: all that are needed, and any of the known ones.
 
     Raises
     ------
@@ -50,15 +50,15 @@ def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> It
             header = cells
             _check_header(path, line, header, needed, known)
         elif any(cells[len(header) :]):
-            rule = f"expected a row has a cell for each of the {len(header)} columns"
-            rule += " (a comma inside a text needs quotes)"
-            raise InputError(f"{path}:{line}", rule, f"{len(cells)} cells")
+            problem = f"must have a cell for each of the {len(header)} columns, and no more"
+            hint = "Put quotes around a text with a comma."
+            raise InputError(f"{path}:{line}", problem, f"{len(cells)} cells", hint)
         else:
             yield Row(path, line, dict(zip(header, cells, strict=False)))
 
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Lines of cells; where semicolons or tabs separate them, as in German, numbers may have commas."""
+    """Read lines of cells; numbers may have decimal commas where semicolons or tabs separate the cells."""
     text = read_text(path)
     delimiter = _delimiter(text)
     try:
@@ -70,7 +70,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
             if any(cells) and not cells[0].startswith("#"):
                 yield reader.line_num, cells
     except csv.Error as error:
-        raise InputError(str(path), "must be a readable CSV file", str(error)) from None
+        raise InputError(str(path), f"is not a CSV file: {error}") from None
 
 
 def _delimiter(text: str) -> str:
@@ -81,7 +81,7 @@ def _delimiter(text: str) -> str:
 
 
 def _with_point(cell: str) -> str:
-    """A number with a decimal comma, alone or before its unit, with a point."""
+    """Write a number with a decimal comma, alone or before its unit, with a point."""
     return re.sub(r"^([+-]?\d+),(\d+(?:[eE][+-]?\d+)?)(?=\s|$)", r"\1.\2", cell)
 
 
@@ -90,10 +90,10 @@ def _check_header(
 ) -> None:
     place = f"{path}:{line}"
     if missing := [name for name in needed if name not in header]:
-        rule = f"expected the first row names the columns, separated by commas; missing: {', '.join(missing)}"
-        raise InputError(place, rule, ", ".join(header))
+        problem = f"the first row must name the columns; missing: {', '.join(missing)}"
+        raise InputError(place, problem, ", ".join(header))
     for name in header:
         if name not in known:
             raise InputError(place, f"must be a known column, {nearest_name(name, list(known))}", name)
         if header.count(name) > 1:
-            raise InputError(place, "expected every column stands once", name)
+            raise InputError(place, "names a column twice", name)

@@ -1,4 +1,4 @@
-"""Text files as people's programs write them: byte-order marks, other encodings, decimal commas."""
+"""Text files from any program: byte-order marks, other encodings, decimal commas."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DELIMITERS = (";", "\t", None, ",")
 
 
 def read_text(path: Path, largest: int = LARGEST) -> str:
-    """Read a text file in UTF-8 of at most so many bytes; a byte-order mark is left out.
+    """Read a text file in UTF-8 of at most `largest` bytes, without its byte-order mark.
 
     Raises
     ------
@@ -37,8 +37,15 @@ def read_text(path: Path, largest: int = LARGEST) -> str:
     try:
         data = read_file(path, largest)
     except OSError as error:
-        raise InputError(str(path), "must be a readable file", error.strerror or str(error)) from None
+        raise InputError(str(path), unreadable(error)) from None
     return decoded(data, str(path))
+
+
+def unreadable(error: OSError) -> str:
+    """Return the problem of a file that the system cannot open."""
+    if isinstance(error, FileNotFoundError):
+        return "no such file"
+    return f"cannot be read: {(error.strerror or str(error)).lower()}"
 
 
 def decoded(data: bytes, place: str) -> str:
@@ -48,14 +55,16 @@ def decoded(data: bytes, place: str) -> str:
         zeros = sorted(half.count(0) / max(len(half), 1) for half in (data[:4096:2], data[1:4096:2]))
         named = "UTF-16" if zeros[0] < 0.05 and zeros[1] > 0.5 else "binary data"
     if named:
-        advice = ": save it as UTF-8" if named.startswith("UTF") else ""
-        raise InputError(place, "must be text in UTF-8", f"{named}{advice}")
+        advice = "Save it as UTF-8." if named.startswith("UTF") else ""
+        raise InputError(place, "must be text in UTF-8", named, advice)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        received = f"the byte 0x{data[error.start]:02x}, as of Windows-1252 or Latin-1: save it as UTF-8"
-        raise InputError(f"{place}, line {line}", "must be text in UTF-8", received) from None
+        received = f"the byte 0x{data[error.start]:02x}, as in Windows-1252 or Latin-1"
+        raise InputError(
+            f"{place}, line {line}", "must be text in UTF-8", received, "Save it as UTF-8."
+        ) from None
 
 
 def split(line: str, delimiter: str | None) -> list[str]:
@@ -64,7 +73,7 @@ def split(line: str, delimiter: str | None) -> list[str]:
 
 
 def is_number(text: str, delimiter: str | None = None) -> bool:
-    """Tell that a cell is a number; a decimal comma may stand in it unless commas separate the cells."""
+    """Return whether a cell is a number, which may have a decimal comma unless commas separate the cells."""
     return bool(_NUMBER.fullmatch(text) or (delimiter != "," and _COMMA_NUMBER.fullmatch(text)))
 
 
@@ -83,6 +92,6 @@ def delimiter_of(line: str) -> str | None:
 
 
 def nearest_name(name: str, known: list[str]) -> str:
-    """Suggest what a misspelt name may have meant, as the end of a sentence."""
+    """Suggest the known name nearest to a misspelt one, as the end of a sentence."""
     near = difflib.get_close_matches(name, known, n=1)
     return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known) or 'none'}"

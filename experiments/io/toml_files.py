@@ -13,22 +13,22 @@ from experiments.io.errors import InputError, StudyError
 from experiments.io.texts import read_text
 
 DEEPEST = 20
-"""Levels of tables and lists in each other that a file may have."""
+"""Levels of nested tables and lists that a file may have."""
 
 MOST_DOTS = 100
-"""Dots in a row of a line's parts: the time that keys of many levels take grows with the square of these."""
+"""Dots in one part of a line: the time to read a key grows with the square of its levels."""
 
 LONGEST_SHOWN = 200
 """Characters of a wrong line that are shown."""
 
 
-def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]:
-    """Read a TOML file, of a kind named for the error message: its text, and what it says.
+def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
+    """Read a TOML file: its text and its document.
 
     Raises
     ------
     StudyError
-        When it cannot be read, or is no TOML.
+        When it cannot be read or is not TOML.
     """
     try:
         text = read_text(path).replace("\r\n", "\n")
@@ -39,16 +39,16 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"at line (\d+)", str(error))
         number = int(found[1]) if found else len(text.splitlines())
-        # another rule for what ends a line may know fewer of them
+        # tomllib ends a line at \n alone
         shown = "".join(text.split("\n")[number - 1 : number]).strip()[:LONGEST_SHOWN]
-        raise StudyError(f"{path}:{number}", f"must be valid TOML: {error}", shown) from None
+        raise StudyError(f"{path}:{number}", f"is not valid TOML: {error}", shown) from None
     except RecursionError:
-        raise StudyError(str(path), "must be TOML of a few levels", "a table far deeper") from None
+        raise StudyError(str(path), f"has more than {DEEPEST} levels of tables and lists") from None
     except InputError as error:
-        raise StudyError(error.place, f"expected {what} {error.problem}", error.value) from None
+        raise StudyError.of(error.problems) from None
     except ValueError as error:
-        # an integer of thousands of digits, for one
-        raise StudyError(str(path), "must be valid TOML", str(error)) from None
+        # e.g. an integer of thousands of digits
+        raise StudyError(str(path), f"is not valid TOML: {error}") from None
 
 
 def _check_keys(text: str) -> None:
@@ -58,7 +58,7 @@ def _check_keys(text: str) -> None:
 
 
 def _check(document: Mapping[str, Any]) -> None:
-    """Refuse, without recursion, what is nested too deep, and integers that TOML does not have."""
+    """Refuse too many levels, without recursion, and integers that TOML does not have."""
     level: list[Any] = [document]
     for _ in range(DEEPEST):
         inner = [value for each in level for value in (each.values() if isinstance(each, Mapping) else each)]
@@ -72,7 +72,7 @@ def _check(document: Mapping[str, Any]) -> None:
 def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = (), array: bool = False) -> str:
     """Write nested tables of text, numbers, truth values, lists of them and lists of tables as TOML.
 
-    None is left out; `path` is where the document stands in the file, in an `array` of tables or alone.
+    Keys whose value is None are skipped; `path` is the key path of the document, `array` if of an array.
     """
     arrays = {key: value for key, value in document.items() if _holds_tables(value)}
     tables = {key: value for key, value in document.items() if isinstance(value, Mapping)}

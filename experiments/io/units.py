@@ -1,4 +1,4 @@
-"""Quantities with units, as study files write them ("110 mm"), turned into SI once, at the edge.
+"""Quantities with units, e.g. "110 mm" in a study file, converted to SI once.
 
 Angles are the one exception to SI: they are in degrees everywhere in ``experiments``.
 """
@@ -109,14 +109,14 @@ def dimension_of_unit(unit: str) -> str:
     Raises
     ------
     ValueError
-        When it is none of a known dimension.
+        When it is not an SI unit of a known dimension.
     """
     if unit == "1":
         return ""
     for dimension, sizes in UNITS.items():
         if sizes.get(unit) == 1.0 or unit == "rad" in sizes:
             return dimension
-    raise ValueError(f"must be an SI unit of a known dimension ({', '.join(UNITS)}), not {unit!r}")
+    raise ValueError(f"must be an SI unit of a known dimension ({', '.join(UNITS)}), got {unit!r}")
 
 
 def unit_size(unit: str, dimension: str) -> float:

@@ -55,7 +55,7 @@ class SeedSettings(Section):
     @model_validator(mode="after")
     def _roots_differ(self) -> SeedSettings:
         if self.campaign == self.target:
-            raise ValueError(f"seeds.campaign and seeds.target must differ, both are {self.campaign}")
+            raise ValueError(f"seeds.campaign and seeds.target must differ, got {self.campaign} twice")
         return self
 
 
@@ -246,12 +246,12 @@ class Target:
     def __post_init__(self) -> None:
         names = [response.name for response in self.responses]
         if not names or len(set(names)) < len(names):
-            raise ValueError(f"Target.responses: at least one, each of a name of its own, got {names}")
+            raise ValueError(f"Target.responses: must have names that differ, one or more, got {names}")
         if self.leading.held_out:
-            raise ValueError(f"Target.responses: the first is not held out, got {names[0]}")
+            raise ValueError(f"Target.responses: the first must not be held out, got {names[0]}")
         for response in self.responses:
             if (response.measured is None) != (self.twin is not None):
-                rule = "has its measurements, unless a twin study simulates them"
+                rule = "must have measurements, unless a twin study simulates them"
                 raise ValueError(f"response {response.name}: {rule}, got {response.measured}")
 
     @property

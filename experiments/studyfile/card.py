@@ -68,11 +68,9 @@ def check_laws(document: Mapping[str, Any], sections: Mapping[str, Any], path: P
     except ValidationError:
         return  # the study's sections are checked next, with their places
     if own != others and solver.get(CARD_LAWS) != others.name:
-        rule = (
-            f"expected the values of the card hold for the laws {others.name!r} and mean something else in these: "
-            f'take those, or say {CARD_LAWS} = "{others.name}" beside them to take the values as they are'
-        )
-        raise StudyError(f"solver.{LAWS}, with the card {path}", rule, solver[LAWS])
+        problem = f"the values of the card hold for the laws {others.name!r} only"
+        hint = f'Take those, or set {CARD_LAWS} = "{others.name}" to take the values as they are.'
+        raise StudyError(f"solver.{LAWS}, with the card {path}", problem, solver[LAWS], hint)
 
 
 def read_card(path: Path) -> dict[str, Any]:
@@ -83,11 +81,11 @@ def read_card(path: Path) -> dict[str, Any]:
     StudyError
         When the file cannot be read, or is no card.
     """
-    _, card = read_toml(path, "a material card")
+    _, card = read_toml(path)
     sections = card.get(MATERIAL)
     if not isinstance(sections, dict) or not set(sections) <= set(SECTIONS):
-        rule = f"expected a material card has the tables {', '.join(f'[{MATERIAL}.{name}]' for name in SECTIONS)}"
-        raise StudyError(str(path), rule, sorted(card))
+        tables = ", ".join(f"[{MATERIAL}.{name}]" for name in SECTIONS)
+        raise StudyError(str(path), f"is not a material card, which has the tables {tables}", sorted(card))
     for table, key in files_of(sections):
         table[key] = str(path.parent.resolve() / table[key])
     bridge = card.get(BRIDGE)
@@ -115,9 +113,7 @@ def card_document(card: Mapping[str, Any], path: Path) -> dict[str, Any]:
     """
     fitted = card.get("fitted", {})
     if not isinstance(fitted, Mapping) or "test" not in fitted:
-        raise StudyError(
-            str(path), "expected a card says which test it was fitted to, [fitted.test.NAME]", fitted
-        )
+        raise StudyError(str(path), "lacks the test that it was fitted to, [fitted.test.NAME]")
     kept = {name: fitted[name] for name in FITTED if name in fitted}
     name = str(card.get("name", path.stem))
     return {"name": name, "scene": fitted["test"]} | kept | read_card(path)

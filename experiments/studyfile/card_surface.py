@@ -37,7 +37,7 @@ def surface_of(table: object, units: Mapping[str, str], place: str) -> Surface:
     Raises
     ------
     StudyError
-        When the table is none that `surface_table` laid out.
+        When `surface_table` did not lay out the table.
     """
     try:
         if not isinstance(table, Mapping):
@@ -51,19 +51,17 @@ def surface_of(table: object, units: Mapping[str, str], place: str) -> Surface:
         full = fit_surface(design, table["values"], table["full"])
         return replace(fit_surface(design, table["values"], table["terms"]), selected_from=full)
     except (DesignError, KeyError, TypeError, ValueError) as error:
-        rule = (
-            "expected a card holds the surface that its values were found on, as dem-warp calibrate writes it"
-        )
-        raise StudyError(place, rule, f"{type(error).__name__}: {error}") from None
+        problem = f"is not a surface as dem-warp calibrate writes it ({type(error).__name__}: {error})"
+        raise StudyError(place, problem) from None
 
 
 def card_surfaces(card: Mapping[str, Any], path: Path) -> dict[str, Surface]:
-    """Fit every surface of a card again, by the response's name; none where the card has none.
+    """Fit every surface of a card again, by the response's name.
 
     Raises
     ------
     StudyError
-        When one is not as a card has it.
+        When one is not a surface.
     """
     units = {name: str(factor.get("unit", "")) for name, factor in card.get("factor", {}).items()}
     tables = card.get(SURFACE, {})

@@ -53,14 +53,14 @@ class ClusterSection(Section):
     @classmethod
     def _is_a_size(cls, memory: str) -> str:
         if not _MEMORY.fullmatch(memory):
-            raise ValueError('must be a size with its unit, as "4 GB"')
+            raise ValueError('must be a size with its unit, e.g. "4 GB"')
         return memory
 
     @field_validator("directives", "prologue")
     @classmethod
     def _are_lines(cls, lines: tuple[str, ...]) -> tuple[str, ...]:
         if broken := [line for line in lines if not _LINE.fullmatch(line)]:
-            raise ValueError(f"must be one line each (not {broken[0]!r})")
+            raise ValueError(f"must be one line each, got {broken[0]!r}")
         return lines
 
 
@@ -79,5 +79,5 @@ def read_profile(path: Path) -> ClusterSection:
     StudyError
         When it cannot be read or breaks a rule.
     """
-    text, document = read_toml(path, "a profile of a cluster")
+    text, document = read_toml(path)
     return validated(Profile, document, Places.read(path, text)).cluster

@@ -58,7 +58,7 @@ BASE = Condition()
 def _named(conditions: dict[str, Condition]) -> dict[str, Condition]:
     for name, condition in conditions.items():
         if not name or not all(character.isalnum() or character in "_-" for character in name):
-            raise ValueError(f"a condition's name has letters, digits, - and _ only, not {name!r}")
+            raise ValueError(f"a condition's name must have letters, digits, - and _ only, got {name!r}")
         condition._name = name
     return conditions
 

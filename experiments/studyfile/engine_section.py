@@ -41,13 +41,13 @@ class EngineSection(Section):
     def _are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         if unknown := [name for name in names if name not in BY_NAME or BY_NAME[name].by_photograph]:
             known = ", ".join(dict.fromkeys(each.name for each in BY_NAME.values() if not each.by_photograph))
-            raise ValueError(f"must be of {known}; the heap shows the others (not {', '.join(unknown)})")
+            raise ValueError(f"must be of {known}, as the heap shows the others, got {', '.join(unknown)}")
         return names
 
     @model_validator(mode="after")
     def _is_one(self) -> Self:
         if (self.name is None) == (self.command is None):
-            raise ValueError("has either a name or a command")
+            raise ValueError("must have a name or a command, not both")
         return self
 
 

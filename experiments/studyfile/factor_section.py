@@ -58,7 +58,7 @@ class FactorSection(Section):
         low, high = self.low.number, self.natural(self.high)
         least, most = self.limits
         if not low < high:
-            raise ValueError(f"low must be below high, not {self.low} above {self.high}")
+            raise ValueError(f"low must be below high, got {self.low} and {self.high}")
         if low < least or high > most:
             raise ValueError(f"low and high must stay within {least:g} and {most:g} {self.unit}".rstrip())
         return self
@@ -142,7 +142,7 @@ class FactorTable(Section):
         places = [place for section in self.factor for place in section.parameter]
         for key, values in (("name", names), ("parameter", places)):
             if twice := sorted({value for value in values if values.count(value) > 1}):
-                raise ValueError(f"each factor has a {key} of its own; given twice: {', '.join(twice)}")
+                raise ValueError(f"no two factors may have the same {key}; given twice: {', '.join(twice)}")
         return self
 
 
@@ -199,5 +199,5 @@ def check_one_home(document: Mapping[str, Any], sections: Iterable[FactorSection
     homes = [(section.name, path) for section in sections for path in section.paths]
     for name, path in homes:
         if (value := value_at(document, path)) is not None:
-            rule = f"is varied by the factor {name!r} and takes no fixed value: remove one of them"
-            raise StudyError(places.of(path), rule, value)
+            problem = f"has a fixed value and is varied by the factor {name!r}"
+            raise StudyError(places.of(path), problem, value, "Remove one of them.")

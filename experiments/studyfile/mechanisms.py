@@ -27,7 +27,7 @@ class MechanismsSection(LibrarySection):
         built = tuple(section.build() for section in self.given.values())
         for kind in ("grains", "walls"):
             for name, other in clashes(tuple(one for one in built if one.acts_between(kind))):
-                rule = f"mechanism.{name} must not stand beside mechanism.{other} in one contact"
+                rule = f"mechanism.{name} and mechanism.{other} must not act in one contact"
                 raise ValueError(f"{rule}, got both between {kind}")
         return built
 

@@ -16,7 +16,7 @@ def write_template(name: str, folder: Path | None = None) -> Path:
     Raises
     ------
     InputError
-        When the name is no plain name, or the file exists.
+        When the name has other characters, or the file exists.
     """
     path = new_study_path(name, folder)
     text = TEMPLATE.read_text(encoding="utf-8").replace("{name}", path.stem).replace("{file}", path.name)
@@ -28,10 +28,10 @@ def new_study_path(name: str, folder: Path | None = None) -> Path:
     """Return the path of a new study file of a grain's name; errors as by `write_template`."""
     name = name.removesuffix(".toml")
     if not name or not all(character.isalnum() or character in " _-" for character in name):
-        raise InputError("NAME", "a name has letters, digits, spaces, - and _ only", name)
+        raise InputError("NAME", "must have letters, digits, spaces, - and _ only", name)
     if is_device_name(name) or name != name.strip():
-        rule = "expected a name has no blank at its ends, and is none of a device of Windows (con, nul, com1, ...)"
-        raise InputError("NAME", rule, repr(name))
+        problem = "must not be a device of Windows (con, nul, com1, ...), nor begin or end with a space"
+        raise InputError("NAME", problem, repr(name))
     path = (folder or Path()) / f"{name}.toml"
     require_new_file(path, "a new study")
     return path

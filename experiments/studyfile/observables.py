@@ -111,7 +111,7 @@ class Observable:
     def in_pictures(self, views: Sequence[View]) -> float:
         """Mean over pictures of one heap."""
         if self.seen is None:
-            raise ValueError(f"no photograph shows {self.name}")
+            raise ValueError(f"{self.name} must be an observable that a photograph shows")
         return float(np.mean([self.seen(view) for view in views]))
 
     def in_heap(self, heap: HeapAngle, views: Sequence[View]) -> float:

@@ -63,7 +63,7 @@ class ShapeSection(Section):
             return None
         path = Path((info.context or {}).get("folder", ".")) / clump
         if not os.path.isfile(path):  # a name too long is none, and raises nothing
-            raise ValueError(f"must name an existing clump file (looked for {path})")
+            raise ValueError(f"no such clump file: {path}")
         return path
 
     @field_validator("clump_unit")
@@ -78,9 +78,9 @@ class ShapeSection(Section):
     def one_shape(self) -> ClumpShape:
         """Build the shape."""
         if self.clump is not None and self.sphere is not None:
-            raise ValueError("takes a clump (a file) or a sphere (a radius), not both")
+            raise ValueError("must have a clump (a file) or a sphere (a radius), not both")
         if self.clump_unit is not None and self.clump is None:
-            raise ValueError("takes clump_unit only with a clump (a file)")
+            raise ValueError("must have clump_unit only with a clump (a file)")
         if self.sphere is not None:
             return _sphere(self.sphere)
         if self.clump is not None:
@@ -123,9 +123,11 @@ class GrainSection(MaterialSection, ShapeSection):
         if self.sizes is None:
             return self
         if isinstance(shape, ShapeMixture):
-            raise ValueError("takes sizes ([grain.sizes]) of one shape, not of several ([grain.shapes.NAME])")
+            raise ValueError(
+                "must have sizes ([grain.sizes]) of one shape only, not of several ([grain.shapes.NAME])"
+            )
         if both := sorted({"size_mean", "size_mean_of", "size_sd"} & self.model_fields_set):
-            raise ValueError(f"takes sizes ([grain.sizes]) or {' and '.join(both)}, not both")
+            raise ValueError(f"must have sizes ([grain.sizes]) or {' and '.join(both)}, not both")
         self.sizes.check_shape(shape)
         return self
 
@@ -134,7 +136,9 @@ class GrainSection(MaterialSection, ShapeSection):
         if not self.shapes:
             return _elongated(self.one_shape(), self.elongation)
         if self.clump is not None or self.sphere is not None:
-            raise ValueError("takes one shape (clump or sphere) or several ([grain.shapes.NAME]), not both")
+            raise ValueError(
+                "must have one shape (clump or sphere) or several ([grain.shapes.NAME]), not both"
+            )
         shapes = (_elongated(part.one_shape(), self.elongation) for part in self.shapes.values())
         return ShapeMixture(tuple(shapes), self._fractions())
 
@@ -145,9 +149,7 @@ class GrainSection(MaterialSection, ShapeSection):
         if parts.count(None) > 1:
             raise ValueError("every shape but one needs its fraction")
         if rest < -FRACTION_TOLERANCE or (None not in parts and rest > FRACTION_TOLERANCE):
-            raise ValueError(
-                f"fractions of the shapes must add up to 1 (one left out takes the rest), not to {given:g}"
-            )
+            raise ValueError(f"fractions of the shapes must add up to 1 (one may be omitted), got {given:g}")
         return tuple(max(rest, 0.0) if fraction is None else fraction for fraction in parts)
 
     @property

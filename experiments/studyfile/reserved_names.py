@@ -57,7 +57,5 @@ def _problems(names: Sequence[str], taken: Collection[str], places: Places) -> I
             base in taken or base == DUMMY or (name == f"{base}_coded" and base in names)
         )
         if name in taken or derived:
-            rule = (
-                "is a column of the results' tables: a factor takes another name, 'E' or 'friction' for one"
-            )
-            yield Problem(places.of(("factor", index, "name")), rule, repr(name))
+            place, problem = places.of(("factor", index, "name")), "is a column of the results' tables"
+            yield Problem(place, problem, repr(name), "Choose another name, e.g. E or friction.")

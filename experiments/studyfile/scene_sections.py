@@ -27,7 +27,7 @@ class SceneSection(LibrarySection):
     def _is_one(self) -> Self:
         if len(self.given) != 1:
             known = ", ".join(f"[scene.{field.alias}]" for field in type(self).model_fields.values())
-            raise ValueError(f"must be one of {known}, not {len(self.given)} of them")
+            raise ValueError(f"must be one of {known}, got {len(self.given)} of them")
         return self
 
     @property

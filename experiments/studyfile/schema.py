@@ -246,4 +246,5 @@ def _problem(
             rule = "is required"
         case _:
             rule = message(details)
-    return Problem(places.of((*at, *path)), rule, "nothing" if value is None else repr(value))
+    shown = "nothing" if value is None else "" if isinstance(value, Mapping) else repr(value)
+    return Problem(places.of((*at, *path)), rule, shown)

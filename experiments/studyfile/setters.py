@@ -81,7 +81,7 @@ def _compiled(parameter: str, *libraries: type[Section]) -> Setter:
     field = trail[-1][1] if trail else None
     dimension = dimension_of(field) if field else None
     if field is None or dimension is None:
-        raise ValueError('must lead to a quantity of the study, as "contact.grain-grain.static_friction"')
+        raise ValueError('must lead to a quantity of the study, e.g. "contact.grain-grain.static_friction"')
     return Setter(path, tuple(name for name, _ in trail), dimension, bounds(field), _reader(field))
 
 

@@ -76,7 +76,7 @@ class SizesSection(Section):
             return None
         path = Path((info.context or {}).get("folder", ".")) / file
         if not os.path.isfile(path):  # a name too long is none, and raises nothing
-            raise ValueError(f"must name an existing file (looked for {path})")
+            raise ValueError(f"no such file: {path}")
         return path
 
     @field_validator("unit")
@@ -90,22 +90,24 @@ class SizesSection(Section):
     def _is_one(self) -> Self:
         given = [name for name in SOURCES if getattr(self, name) is not None]
         if len(given) != 1:
-            raise ValueError(f"takes one of {', '.join(SOURCES)}, not {' and '.join(given) or 'none'}")
+            raise ValueError(
+                f"must have one of {', '.join(SOURCES)}, got {' and '.join(given) or 'no source'}"
+            )
         wanted = TERMS[self.distribution] if self.distribution else ()
         known = {name for names in TERMS.values() for name in names}
         found = {name for name in known if getattr(self, name) is not None}
         if missing := [name for name in wanted if name not in found]:
             raise ValueError(f"a {self.distribution} distribution needs {' and '.join(missing)}")
         if odd := sorted(found - set(wanted)):
-            raise ValueError(f"{given[0]} takes no {', '.join(odd)}")
+            raise ValueError(f"{given[0]} must not have {', '.join(odd)}")
         if self.distribution and self.by is None:
             raise ValueError('a distribution needs by = "number", "volume" or "mass"')
         if self.unit is not None and self.distribution:
-            raise ValueError("takes unit only with a file")
+            raise ValueError("must have unit only with a file")
         if self.sieves is not None and self.by == "number":
-            raise ValueError("a sieve analysis is by mass or volume, not by number")
+            raise ValueError("a sieve analysis must be by mass or volume, not by number")
         if not self.cut[0] < self.cut[1]:
-            raise ValueError(f"cut must rise, not go from {self.cut[0]:g} to {self.cut[1]:g}")
+            raise ValueError(f"cut must rise, got {self.cut[0]:g} and {self.cut[1]:g}")
         self.cut_into_classes()
         return self
 

@@ -67,7 +67,7 @@ class _Laws(Generated):
         if isinstance(value, str):
             return _named(value)
         if not isinstance(value, Mapping):
-            raise ValueError('must name a set of laws, as laws = "liggghts", or be a table law by law')
+            raise ValueError('must name a set of laws, e.g. laws = "liggghts", or be a table law by law')
         try:
             return laws_section().model_validate(value, context=info.context).laws()  # type: ignore[attr-defined]
         except ValidationError as error:
@@ -103,11 +103,9 @@ class SolverSection(Section):
         if self.corrected_for in (None, name, self.card_solver):
             return
         solver = self.corrected_for
-        rule = (
-            f"the values of the card must run in {solver!r}, which a bridge has corrected them for: name it "
-            f'as [engine], or say {CARD_SOLVER} = "{solver}" under [solver] to take the values as they are'
-        )
-        raise StudyError(place, rule, name)
+        problem = f"the values of the card must run in {solver!r}, which a bridge has corrected them for"
+        hint = f'Name it as [engine], or set {CARD_SOLVER} = "{solver}" to take the values as they are.'
+        raise StudyError(place, problem, name, hint)
 
 
 def laws_of(solver: Mapping[str, Any]) -> ContactLaws:

@@ -145,13 +145,13 @@ class Study(Physics):
             When the study has none, they are still to be measured, or its test leaves no heap to match.
         """
         if self.target_section is not None and self.target_section.lacks_a_heap(self.scenes):
-            rule = "is the angle of a heap, which this test does not leave: name an observable of the test"
-            raise StudyError(f"{self.file}: target", rule, "no observable")
+            problem = "needs an observable: this test leaves no heap whose angle could be the target"
+            raise StudyError(f"{self.file}: target", problem)
         if self._target is None and self.target_section is not None:
-            rule = "names pictures, profiles or a file: with_measurements takes numbers from them"
-            raise StudyError(f"{self.file}: target", rule, "no numbers")
+            problem = "with_measurements must first take its numbers from the pictures, profiles or file"
+            raise StudyError(f"{self.file}: target", problem)
         if self._target is None:
-            raise StudyError(str(self.file), "a calibration needs a [target] or a [[response]]", "none")
+            raise StudyError(str(self.file), "needs a [target] or a [[response]] to be calibrated")
         return self._target
 
     @property
@@ -388,7 +388,7 @@ class Study(Physics):
         except GrainCountError as error:
             raise StudyError(self._place_of_grains(scene), error.problem, error.number) from None
         except ValueError as error:
-            raise StudyError(str(self.file), str(error), dict(settings)) from error
+            raise StudyError(str(self.file), str(error), hint=f"The settings are {dict(settings)}.") from error
 
     def _place_of_grains(self, scene: str) -> str:
         """Place of the number of a scene's grains, or of the container that it follows from."""
@@ -434,7 +434,7 @@ def load_study(
     document.pop("scale", None)
     if scale is not None:
         if scale not in scales:
-            rule = f"the scale must be one that the study has, {nearest_name(scale, list(scales))}"
+            rule = f"must have the scale that is asked for, {nearest_name(scale, list(scales))}"
             raise StudyError(str(path), rule, scale)
         document = merge(document, scales[scale])
     return _build(with_material(merge(document, changes or {}), path.parent), places)
@@ -448,7 +448,7 @@ def load_card(path: Path) -> Study:
     StudyError
         When the file cannot be read, is no card, or does not say which test it was fitted to.
     """
-    text, card = read_toml(path, "a material card")
+    text, card = read_toml(path)
     return _build(card_document(card, path), Places.read(path, text))
 
 
@@ -466,10 +466,8 @@ def _build(document: dict[str, Any], places: Places) -> Study:
         study.under(name)
     for name in study.response_scenes:
         if name == TARGET_SCENE or name in study.condition_sections:
-            rule = (
-                f"expected a further scene has a name of its own: {name!r} is the study's own, or a condition"
-            )
-            raise StudyError(places.of(("response-scene", name)), rule, name)
+            problem = "is the name of the study's own scene or of a condition"
+            raise StudyError(places.of(("response-scene", name)), problem, hint="Choose another name.")
     study._match()
     return study
 
@@ -479,10 +477,9 @@ def _check_restitution(study: Study) -> None:
     for section in study.factor_sections if study.solver.laws.damping_rate is not None else ():
         if any(path[-1] == "restitution" for path in section.paths):
             damping = study.solver.laws.normal_damping
-            rule = (
-                f"expected varies a restitution, and the damping {damping!r} takes none: leave the factor out"
-            )
-            raise StudyError(f"{study.file}: factor {section.name}", rule, section.name)
+            problem = f"varies a restitution, which the damping {damping!r} ignores"
+            place = f"{study.file}: factor {section.name}"
+            raise StudyError(place, problem, hint="Remove the factor.")
 
 
 def study_scales(path: str | Path | None = None) -> tuple[str, ...]:
@@ -500,5 +497,5 @@ def study_scales(path: str | Path | None = None) -> tuple[str, ...]:
 def _scales(path: Path, document: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
     scales = document.get("scale", {})
     if not isinstance(scales, Mapping) or not all(isinstance(table, Mapping) for table in scales.values()):
-        raise StudyError(str(path), "expected scales are tables, [scale.NAME]", scales)
+        raise StudyError(f"{path}: scale", "must hold tables, [scale.NAME]", scales)
     return scales

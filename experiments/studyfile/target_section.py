@@ -195,7 +195,7 @@ def _source(target: TargetSection, places: Places) -> str | None:
     if target.twin is not None:
         return None
     if given and (beside := [*given[1:], *numbers]):
-        rule = "takes pictures, a file, or mean, sd and n; one of them"
+        rule = "must be pictures, a file, or mean, sd and n, and only one of these"
         raise StudyError(places.of(("target", given[0])), rule, f"{given[0]} and {', '.join(beside)}")
     return given[0] if given else None
 
@@ -203,10 +203,10 @@ def _source(target: TargetSection, places: Places) -> str | None:
 def _check_name(section: ResponseSection, others: Sequence[Response], path: KeyPath, places: Places) -> None:
     names = [other.name for other in others]
     if section.title in names:
-        rule = f"expected each response has a name of its own, other than {', '.join(map(repr, names))}; set name"
-        raise StudyError(places.of(path), rule, section.title)
+        problem = "must have a name that no other response has"
+        raise StudyError(places.of(path), problem, section.title, "Set name.")
     if (section.scene, section.observable) in [(other.scene, other.observable) for other in others]:
-        rule = "is to be matched already: one response for each observable of a scene"
+        rule = "another response matches this observable of the scene"
         raise StudyError(places.of((*path, "observable")), rule, section.observable)
 
 

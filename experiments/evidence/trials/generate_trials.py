@@ -190,7 +190,7 @@ def seal(
 ) -> None:
     """Draw the truths; write their seals, to be published, and their labels, to be kept."""
     with clear_errors():
-        numbers = Plan(**read_toml(plan, "a plan of trials")[1]) if plan else Plan()
+        numbers = Plan(**read_toml(plan)[1]) if plan else Plan()
         place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
         waves = search.read_bank(bank or bank_beside(scale))
         strangers = [Declared(m.name, m.null, m.maximum) for m in library_for(search.study, STRANGERS)]

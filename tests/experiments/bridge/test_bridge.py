@@ -222,8 +222,8 @@ def test_a_wrong_order_ends_with_code_2_and_leaves_nothing(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("format = 1\n", "says which test it was fitted to"),
-        ("[fitted.test.hopper]\noutlet = 1\n", "a material card has the tables"),
+        ("format = 1\n", "lacks the test that it was fitted to"),
+        ("[fitted.test.hopper]\noutlet = 1\n", "is not a material card"),
     ],
 )
 def test_a_file_that_is_no_card_is_refused(tmp_path: Path, text: str, said: str) -> None:

@@ -169,8 +169,8 @@ LIMIT = "the program was ended at its time limit of 60 s"
 @pytest.mark.parametrize(
     ("reasons", "told", "advice"),
     [
-        ([SPEED.format(0.25), SPEED.format(1.5), SPEED.format(2)], f"of 3 of them: {SPEED}.", "Mend that;"),
-        ([LIMIT, SPEED.format(2), SPEED.format(0.1)], f"of 2 of them: {SPEED}.", "Mend that, or narrow"),
+        ([SPEED.format(0.25), SPEED.format(1.5), SPEED.format(2)], f"of 3 of them: {SPEED}.", "Fix this;"),
+        ([LIMIT, SPEED.format(2), SPEED.format(0.1)], f"of 2 of them: {SPEED}.", "Fix this, or narrow"),
         (["", SPEED.format(2), ""], f"of 1 of them: {SPEED}.", "or narrow the factors' ranges;"),
         ([LIMIT, LIMIT, SPEED.format(2)], f"of 2 of them: {LIMIT}.", "widen the time limit or narrow"),
         ([None, None, None], "3 of 3 cases failed", "widen the time limit or narrow"),

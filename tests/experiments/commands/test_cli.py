@@ -106,7 +106,7 @@ def test_a_wrong_study_ends_with_2_and_writes_nothing(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["absent.toml"], "readable file"),
+        (["absent.toml"], "no such file"),
         (["--scale", "bnch"], "did you mean 'bench'"),
         (["--device", "tpu"], "--device"),
         (["--scale", "bench", "--set", "E"], "NAME=VALUE"),

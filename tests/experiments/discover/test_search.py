@@ -113,7 +113,7 @@ def test_a_bank_of_other_largest_sizes_does_not_know_the_effect(bank: Path) -> N
 
 def test_a_study_that_holds_everything_out_cannot_be_searched() -> None:
     names = [condition.name for condition in trial().conditions]
-    with pytest.raises(StudyError, match="takes part in the fit"):
+    with pytest.raises(StudyError, match="must not be held out"):
         Search.of(trial(condition={name: {"held_out": True} for name in names}))
 
 
@@ -134,7 +134,7 @@ def test_a_bank_comes_back_as_it_was_made(bank: Path) -> None:
     ],
 )
 def test_the_bank_of_another_grain_test_or_condition_is_refused(bank: Path, changes: dict) -> None:
-    with pytest.raises(InputError, match="another study's"):
+    with pytest.raises(InputError, match="is the bank of a study with another"):
         Search.of(trial(**changes)).read_bank(bank)
 
 

@@ -299,7 +299,7 @@ def test_the_command_writes_the_folder_and_refuses_with_exit_code_2(tmp_path: Pa
 def test_a_card_without_its_test_is_refused(tmp_path: Path) -> None:
     card = tmp_path / "material.toml"
     card.write_text("[material.grain]\nsphere = '1 mm'\n", encoding="utf-8")
-    with pytest.raises(StudyError, match="a card says which test it was fitted to"):
+    with pytest.raises(StudyError, match="lacks the test that it was fitted to"):
         load_card(card)
 
 

@@ -95,8 +95,8 @@ def test_quantities_are_read_as_before(text: str) -> None:
     ("line", "said"),
     [
         ("[measurement]\nazimuths = 1000000000\n", "azimuths"),
-        ("seeds = " + "[" * 100_000, "few levels|valid TOML"),
-        ("[a" + ".a" * 100_000 + "]\n", "few levels"),
+        ("seeds = " + "[" * 100_000, "levels of tables|valid TOML"),
+        ("[a" + ".a" * 100_000 + "]\n", "levels of tables"),
         ("n = " + "1" * 5000 + "\n", "valid TOML"),
         (f"[numerics]\nskin = {10**400}\n", "64 bits"),
         ("[campaign.noise_floor]\nreplicates = 1000000000\n", "replicates.*equal to 1000"),

@@ -21,11 +21,7 @@ from experiments.measurement.photographs import drawn_names
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
-EVIDENCE = (
-    "experiments/evidence/performance/",
-    "experiments/evidence/trials/",
-    "experiments/evidence/verification/",
-)
+EVIDENCE = "experiments/evidence/"
 
 ONLY_POSIX = {
     "os.fork", "os.killpg", "os.setsid", "os.getuid", "os.getpgid", "os.uname", "os.sched_getaffinity",
@@ -37,8 +33,8 @@ GUARDED = {
     "experiments/runs/examination.py": {"os.sched_getaffinity"},
 }
 """Calls that stand behind a question for the system."""
-ASKED = {"experiments/evidence/machine.py": {"/proc/cpuinfo"}}
-"""Places of one system that are looked for, and may be missing."""
+ASKED: dict[str, set[str]] = {}
+"""Places of one system that may be missing."""
 
 
 def sources() -> Iterator[tuple[str, ast.Module]]:

@@ -100,10 +100,9 @@ def test_long_values_and_many_problems_are_cut_short() -> None:
     assert len(many.problems) == 1000
 
 
-def test_a_rule_cannot_be_taken_for_a_finding() -> None:
-    told = str(InputError("g.stl", "expected a grain is one closed body", "2 bodies"))
-    assert told == "g.stl: expected: a grain is one closed body, got 2 bodies"
-    assert str(InputError("x", "must be one", "2")) == "x: must be one, got 2"
+def test_an_error_has_a_place_a_problem_a_value_and_a_hint() -> None:
+    assert str(InputError("g.stl", "no such file")) == "g.stl: no such file"
+    assert str(InputError("x", "must be one", "2", "Use 1.")) == "x: must be one, got 2. Use 1."
 
 
 def test_a_machine_without_a_gpu_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

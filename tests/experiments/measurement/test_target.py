@@ -187,7 +187,7 @@ def test_a_file_measured_under_held_out_conditions_alone_leads_nowhere(from_sour
         (f'{NUMBERS}fit = "middle"', "target.fit", "measured with the same fit"),
         (f'{NUMBERS}fit = "midle"', "target.fit", "the fit is one of"),
         ('pictures = "photos"', "target.pictures", "at least two pictures"),
-        ('file = "none.csv"', "none.csv", "readable file"),
+        ('file = "none.csv"', "none.csv", "no such file"),
     ],
 )
 def test_measurements_that_cannot_be_used_are_refused(
@@ -209,11 +209,11 @@ def test_angles_of_a_file_say_how_they_were_fitted(from_source, tmp_path: Path) 
 
 @pytest.mark.parametrize("source", [f'{NUMBERS}pictures = "a"', 'pictures = "a"\nfile = "b.csv"'])
 def test_a_target_has_one_source(from_source, source: str) -> None:
-    with pytest.raises(InputError, match="one of them"):
+    with pytest.raises(InputError, match="only one of these"):
         from_source(source)
 
 
 def test_numbers_must_be_taken_before_a_target_is_read(from_source) -> None:
     study = from_source('pictures = "photos"')
-    with pytest.raises(InputError, match="with_measurements"):
+    with pytest.raises(InputError, match="with_measurements must first"):
         study.target  # noqa: B018

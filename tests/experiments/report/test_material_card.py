@@ -106,13 +106,13 @@ def test_the_settings_of_a_card_are_those_of_the_study(campaign: Campaign, study
 @pytest.mark.parametrize(
     ("content", "rule"),
     [
-        (None, "card.toml: a material card must be a readable file"),
-        ("x = 1", r"card.toml: expected: a material card has the tables \[material.grain\]"),
+        (None, "card.toml: no such file"),
+        ("x = 1", r"card.toml: is not a material card, which has the tables \[material.grain\]"),
         (
             "[material.scene]\nx = 1",
-            r"card.toml: expected: a material card has the tables \[material.grain\]",
+            r"card.toml: is not a material card, which has the tables \[material.grain\]",
         ),
-        ("x = ", "card.toml:1: must be valid TOML"),
+        ("x = ", "card.toml:1: is not valid TOML"),
     ],
 )
 def test_what_is_no_card_is_refused(tmp_path: Path, content: str | None, rule: str) -> None:

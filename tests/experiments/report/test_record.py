@@ -138,7 +138,7 @@ def test_a_record_takes_in_a_card_scales_sensitivities_and_notes(
 
 
 def test_a_folder_without_the_papers_runs_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f"{RUNS}: a folder to gather from must hold"):
+    with pytest.raises(InputError, match=f"{RUNS}: no such file"):
         paper_record.gather_scale("bench", tmp_path, tmp_path / "record")
 
 

@@ -62,7 +62,7 @@ def clump(text: str | bytes, *words: str, options: str = "", name: str = "g.txt"
 HOSTILE = {
     # Study files
     "no study": Hostile(
-        "heap none.toml --device cpu --out o", ("none.toml", "readable file", "No such file")
+        "heap none.toml --device cpu --out o", ("none.toml", "no such file")
     ),
     "a folder": Hostile("heap . --device cpu --out o", ("regular file", "folder")),
     "empty study": Hostile(
@@ -96,7 +96,7 @@ HOSTILE = {
     ),
     "narrow tube": study("heap", '"28 mm"\nheight', '"7 mm"\nheight', "scene", "2 grains wide", "7 mm"),
     "no grain's size": study("heap", '"2 mm"', '"0 mm"', "grain.sphere", "greater than 0", "0 mm"),
-    "no clump": study("heap", 'sphere = "2 mm"', 'clump = "c.txt"', "grain.clump", "existing clump", "c.txt"),
+    "no clump": study("heap", 'sphere = "2 mm"', 'clump = "c.txt"', "grain.clump", "no such clump file", "c.txt"),
     "clump and sphere": study("heap", "[grain]", '[grain]\nclump = "s.toml"', "grain", "not both"),
     "nine megabytes": study(
         "heap", 'name = "Small"', f'nome = "{"x" * 9_000_000}"', "nome", "unknown key"
@@ -131,7 +131,7 @@ HOSTILE = {
         "heap s.toml --device cpu --out .", (".", "new or empty", "used"), {"s.toml": SMALL_STUDY}
     ),
     "a file for a folder": Hostile(
-        "heap s.toml --device cpu --out s.toml", ("s.toml", "new or empty", ", got a file)"),
+        "heap s.toml --device cpu --out s.toml", ("s.toml", "new or empty", ", got a file"),
         {"s.toml": SMALL_STUDY},
     ),
     "a bank of nothing": Hostile(
@@ -201,7 +201,7 @@ HOSTILE = {
     # Pictures and heaps
     "no picture": Hostile("angle p.jpg", ("p.jpg", "the picture is a regular file", "no such file")),
     "a folder as a picture": Hostile("angle .", ("the picture is a regular file", "a folder; name what")),
-    "text as a picture": Hostile("angle p.jpg", ("p.jpg", "expected: the file is a picture", "6 bytes"),
+    "text as a picture": Hostile("angle p.jpg", ("p.jpg", "a picture", "6 bytes"),
                                  {"p.jpg": "hello\n"}),
     "half a crop": Hostile("angle p.jpg --crop 1,2", ("--crop", "four numbers", "1,2"), {"p.jpg": "x"}),
     "unknown fit": Hostile("angle p.jpg --fit wide", ("fit", "flank, middle", "wide"), {"p.jpg": "x"}),

@@ -70,7 +70,7 @@ wall_adhesion_energy_density = 50.0
         ('[mechanism.jkr]\nbetween = "grain"', r"mechanism.jkr.between: must be 'all', 'grains' or 'walls'"),
         (
             "[mechanism.kinetic_friction]\nfriction_drop = 1.5",
-            r"friction_drop: must be less than 1, got 1.5\)",
+            r"friction_drop: must be less than 1, got 1.5",
         ),
         (
             '[mechanism.jkr]\nwork_of_adhesion = "0.1 J"',
@@ -78,7 +78,7 @@ wall_adhesion_energy_density = 50.0
         ),
         (
             "[mechanism.jkr]\nwork_of_adhesion = 0.1\n[mechanism.hysteretic_spring]\nplasticity = 0.3",
-            r"mechanism.jkr must not stand beside mechanism.hysteretic_spring in one contact",
+            r"mechanism.jkr and mechanism.hysteretic_spring must not act in one contact",
         ),
     ],
 )

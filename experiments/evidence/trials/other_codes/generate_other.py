@@ -161,7 +161,7 @@ def seal(
     """Draw the truths; write their seals, to be published, and their labels, to be kept."""
     with clear_errors():
         engine_for(code)
-        numbers = plan_for(code, Plan(**read_toml(plan, "a plan of trials")[1]) if plan else PLAN)
+        numbers = plan_for(code, Plan(**read_toml(plan)[1]) if plan else PLAN)
         place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
         waves = search.read_bank(bank or bank_beside(scale))
         drawn = secrets.randbits(63) if seed is None else seed

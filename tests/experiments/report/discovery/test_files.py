@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from doe.discrepancy import Discovery, Interval, Settings, Verdict
-from experiments.calibrate.checks import check_study
+from experiments.calibrate.checks import check_calibration
 from experiments.calibrate.noise_stage import plan_noise_floor
 from experiments.discover.mechanism_files import library_for
 from experiments.io.plain_data import jsonable
@@ -107,7 +107,7 @@ def test_all_that_was_measured_is_to_be_matched_under_its_condition(
         assert response.measured.se == pytest.approx(data.standard_errors[row, column], rel=1e-5)
         assert response.held_out == data.held_out[row]
     # A campaign on it simulates what takes part in the fit, each under its condition.
-    check_study(study)
+    check_calibration(study)
     plan = plan_noise_floor(study)
     fitted = {name for name, held_out in zip(data.conditions, data.held_out, strict=True) if not held_out}
     assert set(plan["scene"]) == (fitted - {"base"}) | {TARGET_SCENE}
