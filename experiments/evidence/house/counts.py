@@ -1,0 +1,223 @@
+"""Counts of lines, rooms, imports, data and like code, each with the limit that a test holds.
+
+A room is a folder directly in a package, or a file there. An import between rooms is a pair of rooms, whatever
+the number of import statements. A floor is the longest chain of imports below a room. Like code is a run of six
+statements that are equal once names and values are erased, and that at most eight files share: more is a form
+of the language.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import subprocess
+import tomllib
+import zipfile
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
+from itertools import combinations
+from pathlib import Path
+
+from setuptools import find_packages
+
+ROOT = Path(__file__).parents[3]
+PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
+EVIDENCE = "experiments/evidence/"
+MEGABYTE = 1e6
+
+LIKE_STATEMENTS, LIKE_FILES = 6, 8
+"""Statements of a run of like code, and files above which such a run is a common form."""
+LOOSE = {"__init__", "__main__", "conftest"}
+"""Base names that every folder may have."""
+
+
+@dataclass(frozen=True)
+class Count:
+    """One row of the table."""
+
+    what: str
+    """What is counted."""
+    value: float
+    """Count in this checkout."""
+    limit: float
+    """Most that a test allows."""
+
+
+@cache
+def tracked() -> tuple[str, ...]:
+    """Paths of all files that git tracks, relative to the repository, with ``/``."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
+    return tuple(name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file())
+
+
+def python_files(*prefixes: str) -> list[str]:
+    """Paths of tracked Python files below some folders."""
+    return [name for name in tracked() if name.endswith(".py") and name.startswith(prefixes)]
+
+
+@cache
+def tree(name: str) -> ast.Module:
+    """Syntax tree of a tracked file."""
+    return ast.parse((ROOT / name).read_text(encoding="utf-8"), name)
+
+
+def lines(names: Iterable[str]) -> int:
+    """Number of lines of some files."""
+    return sum((ROOT / name).read_text(encoding="utf-8").count("\n") for name in names)
+
+
+def megabytes(names: Iterable[str]) -> float:
+    """Size of some files [MB]."""
+    return sum((ROOT / name).stat().st_size for name in names) / MEGABYTE
+
+
+def room(module: str) -> str:
+    """Room of a module, as ``experiments.cases``."""
+    return ".".join(module.split(".")[:2])
+
+
+def _modules(package: str) -> dict[str, str]:
+    """Modules of a package with their files; the evidence is not part of it."""
+    names = (name for name in python_files(package + "/") if not name.startswith(EVIDENCE))
+    return {name.removesuffix(".py").removesuffix("/__init__").replace("/", "."): name for name in names}
+
+
+def _imported(name: str, modules: dict[str, str]) -> Iterator[str]:
+    for node in ast.walk(tree(name)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in modules)
+        elif isinstance(node, ast.ImportFrom) and node.module in modules:
+            inner = (f"{node.module}.{alias.name}" for alias in node.names)
+            yield from (each if each in modules else node.module for each in inner)
+
+
+def imports_between_rooms(package: str) -> set[tuple[str, str]]:
+    """Pairs of rooms of a package of which the first imports the second."""
+    modules = _modules(package)
+    pairs = {(room(module), room(other)) for module, name in modules.items() for other in _imported(name, modules)}
+    return {(above, below) for above, below in pairs if above != below and package not in (above, below)}
+
+
+def floors(pairs: set[tuple[str, str]]) -> tuple[int, int]:
+    """Longest chain of rooms, and the number of pairs to be left out until no room imports itself around others."""
+    below: dict[str, set[str]] = defaultdict(set)
+    for above, under in pairs:
+        below[above].add(under)
+    upward = 0
+    while True:
+        try:
+            order = list(TopologicalSorter(below).static_order())
+            break
+        except CycleError as error:
+            upward += 1
+            first, second = error.args[1][:2]
+            below[second].discard(first)
+    height: dict[str, int] = {}
+    for name in order:
+        height[name] = 1 + max((height[under] for under in below[name]), default=0)
+    return max(height.values(), default=0), upward
+
+
+def _shape(node: ast.AST) -> str:
+    """Form of a statement without names, values and the statements inside it."""
+    if isinstance(node, ast.Name | ast.Constant):
+        return type(node).__name__
+    parts = []
+    for _, value in ast.iter_fields(node):
+        if isinstance(value, list):
+            parts.append(",".join(_shape(item) for item in value if isinstance(item, ast.AST) and not isinstance(item, ast.stmt)))
+        elif isinstance(value, ast.AST):
+            parts.append(_shape(value))
+    return f"{type(node).__name__}({';'.join(parts)})"
+
+
+def _statements(body: list[ast.stmt]) -> Iterator[tuple[str, int]]:
+    """Shapes and lines of statements, those inside others after them; imports and docstrings are left out."""
+    for node in body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            continue
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            continue
+        yield _shape(node), node.lineno
+        for part in ("body", "orelse", "finalbody"):
+            yield from _statements(getattr(node, part, []))
+        for handler in getattr(node, "handlers", []):
+            yield from _statements(handler.body)
+
+
+def like_code() -> set[tuple[str, str]]:
+    """Pairs of files that share a run of like code; a file that repeats itself is a pair with itself."""
+    places: dict[tuple[str, ...], set[tuple[str, int]]] = defaultdict(set)
+    for name in python_files(*(f"{package}/" for package in PACKAGES)):
+        statements = list(_statements(tree(name).body))
+        for index in range(len(statements) - LIKE_STATEMENTS + 1):
+            run = statements[index : index + LIKE_STATEMENTS]
+            places[tuple(shape for shape, _ in run)].add((name, run[0][1]))
+    pairs = set()
+    for found in places.values():
+        if len({name for name, _ in found}) <= LIKE_FILES:
+            for (name, line), (other, further) in combinations(sorted(found), 2):
+                if name != other or further - line >= LIKE_STATEMENTS:
+                    pairs.add((name, other))
+    return pairs
+
+
+def shared_base_names() -> list[str]:
+    """Base names that more than one Python file of the repository bears."""
+    counted = Counter(Path(name).stem for name in python_files(""))
+    return sorted(name for name, count in counted.items() if count > 1 and name not in LOOSE)
+
+
+def installed() -> list[str]:
+    """Tracked files that pip installs, by the rules of pyproject.toml."""
+    rules = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
+    packages = find_packages(str(ROOT), **rules["packages"]["find"])
+    folders = {package.replace(".", "/") for package in packages}
+    kinds = ["*.py", *rules["package-data"]["*"]]
+    inside = (name for name in tracked() if name.rpartition("/")[0] in folders)
+    return [name for name in inside if any(Path(name).match(kind) for kind in kinds)]
+
+
+def wheel_megabytes() -> float:
+    """Size of the wheel [MB], deflated as pip's."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in installed():
+            archive.write(ROOT / name, name)
+    return len(packed.getvalue()) / MEGABYTE
+
+
+def hard_dependencies() -> list[str]:
+    """Requirements of every installation."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return list(project["dependencies"])
+
+
+def counts() -> list[Count]:
+    """All rows that files alone decide."""
+    product = [name for name in python_files("experiments/") if not name.startswith(EVIDENCE)]
+    rooms = {name.split("/")[1] for name in product if name.count("/") > 1}
+    own, pictures = imports_between_rooms("experiments"), imports_between_rooms("imaging")
+    height, upward = floors(own)
+    data = [name for name in tracked() if not name.endswith((".py", ".pyi"))]
+    return [
+        Count("experiments without evidence, lines", lines(product), 28_000),
+        Count("experiments, folders without evidence", len(rooms), 15),
+        Count("experiments, floors", height, 10),
+        Count("experiments, imports between rooms", len(own), 65),
+        Count("experiments, imports upwards", upward, 0),
+        Count("evidence, lines", lines(python_files(EVIDENCE)), 18_000),
+        Count("imaging, floors", floors(pictures)[0], 8),
+        Count("imaging, imports between rooms", len(pictures), 50),
+        Count("imports upwards, doe and imaging", floors(pictures)[1] + floors(imports_between_rooms("doe"))[1], 0),
+        Count("installed, lines", lines(name for name in installed() if name.endswith(".py")), 57_500),
+        Count("wheel [MB]", wheel_megabytes(), 1.5),
+        Count("tests, lines", lines(python_files("tests/")), 33_000),
+        Count("tracked data [MB]", megabytes(data), 16.0),
+        Count("hard dependencies", len(hard_dependencies()), 18),
+        Count("pairs of files with like code", len(like_code()), 150),
+        Count("base names used more than once", len(shared_base_names()), 40),
+    ]
