@@ -37,13 +37,18 @@ def place(path: Path, line: int) -> str:
 def statements(path: Path) -> Iterator[tuple[int, str]]:
     """Yield every string that is a statement: docstrings, and the texts below fields and constants."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            if isinstance(node.value.value, str):
-                yield node.lineno, node.value.value
+        match node:
+            case ast.Expr(value=ast.Constant(value=str(text))):
+                yield node.lineno, text
 
 
 def test_a_text_begins_with_what_it_names() -> None:
-    wrong = [place(path, line) for path in files({".py"}) for line, text in statements(path) if BEGINNING.match(text)]
+    wrong = [
+        place(path, line)
+        for path in files({".py"})
+        for line, text in statements(path)
+        if BEGINNING.match(text)
+    ]
     assert wrong == []
 
 

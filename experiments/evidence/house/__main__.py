@@ -1,6 +1,6 @@
 """Print the counts of the house beside their limits; with --walk also those of a traced calibration.
 
-    python -m experiments.evidence.house [--walk]
+python -m experiments.evidence.house [--walk]
 """
 
 from __future__ import annotations

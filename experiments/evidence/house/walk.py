@@ -1,7 +1,7 @@
-"""The way of a study from the command that calibrates to the kernel, traced as it runs.
+"""The way of a study from the command that calibrates to the engine, traced as it runs.
 
-A step is a call that hands a study on, counted once for each pair of functions: of a calibration at the scale
-bench whose engine is a stand-in. Members of the study itself are no steps.
+A step is a call that receives a study, counted once for each pair of functions, in the order of their first
+calls, in a calibration at the scale bench whose engine is a stand-in.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import CodeType, FrameType
+from typing import Any
 
 from experiments.api import calibrate
 from experiments.evidence.house import stand_in
 from experiments.evidence.house.counts import PACKAGES, ROOT, Count, heights, imports_between_rooms
-from experiments.studies.default import BUCKWHEAT
-from experiments.studyfile import Study
+from experiments.studyfile import Study, load_study
 
-Step = tuple[str, str]
-"""Rooms of a call: of the function that calls, and of the one that is called."""
+STUDY = ROOT / "experiments" / "studies" / "buckwheat" / "study.toml"
 
 
 @cache
@@ -35,8 +35,46 @@ def _room(code: CodeType) -> str:
     return f"{package}.{inside[0].removesuffix('.py')}" if package in PACKAGES else ""
 
 
-def _hands_a_study_on(frame: FrameType) -> bool:
-    code = frame.f_code
-    names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
-    first = frame.f_locals.get(names[0]) if names else None
-    return not isinstance(first, Study) or names[0] != "self"
+@contextmanager
+def _traced(steps: dict[tuple[CodeType | None, CodeType], str]) -> Iterator[None]:
+    """Note the room of each step, by the functions that call and that are called."""
+
+    def note(frame: FrameType, event: str, _: Any) -> None:
+        code = frame.f_code
+        if event != "call" or not _room(code):
+            return
+        names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+        if any(isinstance(frame.f_locals.get(name), Study) for name in names):
+            caller = frame.f_back
+            while caller is not None and not _room(caller.f_code):
+                caller = caller.f_back
+            steps.setdefault((caller and caller.f_code, code), _room(code))
+
+    sys.setprofile(note)
+    threading.setprofile(note)
+    try:
+        yield
+    finally:
+        sys.setprofile(None)
+        threading.setprofile(None)  # type: ignore[arg-type]
+
+
+def rooms_of_a_calibration() -> list[str]:
+    """Rooms of all steps, in order."""
+    steps: dict[tuple[CodeType | None, CodeType], str] = {}
+    words = f'"{sys.executable}" "{stand_in.__file__}"'
+    study = load_study(STUDY, "bench").with_engine({"command": words})
+    with TemporaryDirectory() as folder, _traced(steps):
+        calibrate(study, Path(folder) / "out", device="cpu", workers=2)
+    return list(steps.values())
+
+
+def walk() -> list[Count]:
+    """Count the changes of room, and those to a room on a higher floor."""
+    floor = heights(imports_between_rooms("experiments"))
+    changes = [pair for pair in pairwise(rooms_of_a_calibration()) if pair[0] != pair[1]]
+    climbs = sum(floor.get(above, 0) > floor.get(below, 0) for below, above in changes)
+    return [
+        Count("calibrate to the engine, changes of room", len(changes), 45),
+        Count("calibrate to the engine, climbs", climbs, 12),
+    ]

@@ -1,0 +1,22 @@
+"""The limits of the house, without exceptions."""
+
+import pytest
+
+from experiments.evidence.house.counts import Count, circles_broken, counts, heights
+from experiments.evidence.house.walk import walk
+
+
+@pytest.mark.parametrize("count", counts(), ids=lambda count: count.what)
+def test_the_house_stays_within_its_limits(count: Count) -> None:
+    assert count.value <= count.limit
+
+
+def test_a_study_goes_down_from_the_command_to_the_engine() -> None:
+    assert [count for count in walk() if count.value > count.limit] == []
+
+
+def test_floors_and_circles_are_counted() -> None:
+    chain = {("roof", "wall"), ("wall", "ground"), ("roof", "ground")}
+    assert heights(chain) == {"ground": 1, "wall": 2, "roof": 3}
+    assert circles_broken(chain)[1] == 0
+    assert circles_broken(chain | {("ground", "roof")})[1] > 0
