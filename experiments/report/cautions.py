@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from experiments.calibrate.results import Campaign
-from experiments.measurement.filling import filling_missed, filling_reached, filling_told
+from experiments.measurement.filling import filling_missed, filling_reached, filling_text
 from experiments.report.kit.numbers import capital, enumeration, fixed
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
@@ -76,7 +76,7 @@ def _filling(campaign: Campaign, study: Study) -> Iterator[Caution]:
         reached = filling_reached(scene, {"fill_height": float(rows["fill_height"].median())})
         if reached is not None and filling_missed(scene, reached):
             yield Caution(
-                f"The drum was filled otherwise than stated: {filling_told(scene, reached)}. Change filling, "
+                f"The drum was filled otherwise than stated: {filling_text(scene, reached)}. Change filling, "
                 "or count the grains (grain_count).",
                 "summary",
             )
