@@ -73,7 +73,7 @@ def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
         InputError, match=r"p.csv: replicate: needs profiles of 3 repeats or more, .*, got 1: 1"
     ):
         with_profiles(study)
-    with pytest.raises(StudyError, match=r"names pictures, profiles or a file"):
+    with pytest.raises(StudyError, match="with_measurements must first"):
         _ = study.target
 
 

@@ -200,7 +200,7 @@ def test_an_outline_needs_profiles_or_a_twin(write_study: Callable[..., Path], t
     study = load_study(write_study((ANGLE, '[target]\nobservable = "outline"\n')))
     with pytest.raises(InputError, match=r'"outline" needs profiles, a file of them, or a twin'):
         with_profiles(study)
-    with pytest.raises(StudyError, match=r"names pictures, profiles or a file"):
+    with pytest.raises(StudyError, match="with_measurements must first"):
         _ = load_study(write_study((ANGLE, TARGET))).target
 
 

@@ -249,7 +249,7 @@ def test_every_wrong_row_is_named_at_once(read) -> None:
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("condition|replicate|observable|value\n", "commas"), (HEADER.replace("unit", "units"), "known column")],
+    [("condition|replicate|observable|value\n", "name the columns"), (HEADER.replace("unit", "units"), "known column")],
 )
 def test_a_wrong_header_is_refused(read, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
