@@ -3,8 +3,7 @@
 from .contact import Contact, Term, contacts_of, values
 from .export_folder import export_input, write_export
 from .exporter import ExportedTest, Exporter, Translation
-from .exporters import EXPORTERS
-from .facts import case_terms, term_warnings
+from .exporters import EXPORTERS, case_terms, term_warnings
 from .laws import Translated
 
 __all__ = [

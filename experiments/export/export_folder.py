@@ -1,19 +1,21 @@
-"""The folder of an exported test: the other code's input, with a README of what was translated how."""
+"""Folder of an exported test: the other code's input, with a README on the translation."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from experiments.export.exporter import ExportedTest, Translation
+from dem_warp import Case
+from experiments.export.exporter import ExportedTest, Exporter, Translation
 from experiments.export.exporters import EXPORTERS
-from experiments.export.facts import grain_rows, laws_row
+from experiments.export.laws import Translated
 from experiments.io.errors import InputError, Problem
 from experiments.io.files import write_text
 from experiments.io.program_version import program_version
 
 README = "README.md"
-"""File that says what was translated how."""
+"""File about the translation."""
 
 
 def export_input(
@@ -28,23 +30,25 @@ def export_input(
     to
         Name of the code, a key of `EXPORTERS`.
     approximate
-        Take the nearest for what the code lacks, with a warning at the top of the input.
+        Replace what the code lacks by the nearest that it has, with a warning at the top of the input.
     option
-        Words by which a person says so, for the message.
+        Name of that option, for the message.
 
     Raises
     ------
     InputError
-        When there is no such code or it has no input, when it cannot have the test at all, or lacks something
-        of it and the nearest will not do.
+        When the code is unknown or has no input, or lacks something of the test.
     """
     known = {name: each.translate for name, each in EXPORTERS.items() if each.translate is not None}
     if to not in known:
         raise InputError("--to", f"must be one of {', '.join(known)}", to)
     translation = known[to](test)
     if translation.warnings and not approximate:
-        rule = f"{EXPORTERS[to].code} must have all of the test, or {option} takes the nearest that it has"
-        raise InputError.of(Problem(test.source, rule, warning) for warning in translation.warnings)
+        hint = f"{option} substitutes the nearest that it has"
+        problem = f"{EXPORTERS[to].code} does not support the whole test"
+        raise InputError.of(
+            Problem(test.source, f"{problem}: {each}", "", hint) for each in translation.warnings
+        )
     return translation
 
 
@@ -68,7 +72,7 @@ def _head(test: ExportedTest, to: str, translation: Translation) -> str:
 
 
 def readme(test: ExportedTest, to: str, translation: Translation) -> str:
-    """Say how to run an exported test, what was translated how, and what could not be."""
+    """Write how to run an exported test, how each part was translated, and what could not be."""
     exporter = EXPORTERS[to]
     parts = [f"# {test.name} in {exporter.code}\n\nFrom {test.source}, by dem-warp {program_version()}.\n"]
     if exporter.unproven:
@@ -79,10 +83,30 @@ def readme(test: ExportedTest, to: str, translation: Translation) -> str:
         parts.append(_running(test, translation))
     if test.settings:
         parts.append("## Factors\n\n" + _table(("factor", "value"), list(test.settings.items())))
-    rows = [(row.subject, row.here, row.there) for row in (laws_row(test, exporter), *translation.translated)]
+    rows = [
+        (row.subject, row.here, row.there) for row in (_laws_row(test, exporter), *translation.translated)
+    ]
     parts.append("## Translated\n\n" + _table(("what", "in dem-warp", f"in {exporter.code}"), rows))
-    parts.append("## Grains\n\n" + _table(*grain_rows(test.case)))
+    parts.append("## Grains\n\n" + _table(*_grain_rows(test.case)))
     return "\n".join(parts)
+
+
+def _laws_row(test: ExportedTest, exporter: Exporter) -> Translated:
+    named = f"the set `{test.case.laws.name}`"
+    own = ", ".join([named, *(mechanism.name for mechanism in test.case.mechanisms)])
+    return Translated("contact laws", own, f"{exporter.laws}. {exporter.differs}")
+
+
+def _grain_rows(case: Case[Any]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
+    # of the union of the spheres: no overlap counts twice
+    density, mixture = case.grain_material.density, case.grains.mixture
+    head = ("shape", "fraction", "spheres", "mass [kg]", "principal moments of inertia [kg m2]")
+    rows: list[tuple[object, ...]] = []
+    for number, (shape, fraction) in enumerate(zip(mixture.shapes, mixture.fractions, strict=True), 1):
+        mass = density * shape.volume
+        moments = ", ".join(f"{mass * moment:.6g}" for moment in shape.inertia_over_mass)
+        rows.append((number, f"{fraction:.4g}", shape.sphere_count, f"{mass:.6g}", moments))
+    return head, rows
 
 
 def _running(test: ExportedTest, translation: Translation) -> str:

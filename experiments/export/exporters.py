@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
+from dem_warp import Case
 from dem_warp.registry import Registry
+from experiments.export.contact import Term, contacts_of
 from experiments.export.deme_exporter import DEME
 from experiments.export.exporter import Exporter
 from experiments.export.lammps_exporter import LAMMPS
+from experiments.export.laws import mechanism_warnings
 from experiments.export.liggghts_exporter import LIGGGHTS
 from experiments.export.mercury_exporter import MERCURY
 from experiments.export.sheet import EDEM, ROCKY
@@ -29,3 +35,28 @@ _ALL = {
 
 EXPORTERS: Registry[Exporter] = Registry("dem_warp.exporters", _ALL, _check)
 """Exporters by the name of their code on the command line."""
+
+
+def case_terms(name: str, case: Case[Any]) -> list[tuple[str, Term]]:
+    """Tabulate the terms of a case for a code, each with its subject; what the code lacks, it replaces."""
+    exporter = EXPORTERS[name]
+    laws = case.laws if exporter.conventions is None else exporter.conventions.nearest_laws(case.laws)
+    base = replace(case, mechanisms=(), laws=laws)
+    shapes, size = case.grains.mixture.shapes, case.grains.size_mean
+    radius = max(float(shape.radii.max()) for shape in shapes) * size
+    mass = case.grain_material.density * case.grains.mean(lambda shape: shape.volume) * size**3
+    among, wall = contacts_of(base, radius, mass)
+    rows = [
+        *(("grain", term) for term in exporter.material_terms(among.first)),
+        *(("wall", term) for term in exporter.material_terms(wall.second)),
+    ]
+    for subject, contact in (("grain with grain", among), ("grain with wall", wall)):
+        rows += [(subject, term) for term in exporter.contact_terms(contact)]
+    return rows
+
+
+def term_warnings(name: str, case: Case[Any]) -> tuple[str, ...]:
+    """Name the laws and mechanisms of a case that a code lacks."""
+    exporter = EXPORTERS[name]
+    laws = () if exporter.conventions is None else exporter.conventions.warnings(case.laws)
+    return laws + mechanism_warnings(case, exporter.code)

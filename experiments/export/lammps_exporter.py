@@ -235,7 +235,7 @@ def _molecule_radius(template: Template) -> float:
 
 
 def _filling(lift: Lift) -> str:
-    settle = rest_loop(lift, "settle", lift.settle_limit, text.QUIT)
+    settle = rest_loop(lift, "settle", text.QUIT)
     if lift.scene.grain_count is not None:
         insertions = math.ceil(lift.count / grains_at_once(lift))
         time = max(lift.count / lift.rain_rate + 2.0 * lift.rain_period, insertions * _fall_time(lift))
@@ -249,7 +249,7 @@ def _lifting(lift: Lift) -> str:
     scene, looks = lift.scene, max(round(lift.scene.lift_time / LOOK), 1)
     loop = clear_loop(lift.steps(LOOK), looks, lift.largest_radius)
     lifting = _LIFT.format(step_rise=lift.case.time_step * scene.lift_speed, loop=loop)
-    return lifting + rest_loop(lift, "rest", lift.rest_limit, text.QUIT) + _END
+    return lifting + rest_loop(lift, "rest", text.QUIT) + _END
 
 
 def _rows(lift: Lift) -> tuple[Translated, ...]:

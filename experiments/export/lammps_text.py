@@ -37,15 +37,7 @@ fix bodies all rigid/small molecule {bodies} gravity weight
 
 
 def head(atom_map: str, cutoff: float = 0.0) -> str:
-    """Write the first commands.
-
-    Parameters
-    ----------
-    atom_map
-        Words on how atoms are found and sorted.
-    cutoff
-        Reach of communication [m]; 0 leaves it to LAMMPS.
-    """
+    """Write the first commands: how atoms are found and sorted, the reach of communication [m] if not 0."""
     return _HEAD.format(map=atom_map, cutoff=f" cutoff {cutoff:.6g}" if cutoff else "")
 
 
@@ -69,16 +61,9 @@ def contacts(pairs: Mapping[str, str], time_step: float) -> str:
 
 
 def granular_words(terms: Mapping[str, float], words: Mapping[str, str], surface_energy: float = 0.0) -> str:
-    """Write the words for a contact, after ``pair_coeff * *`` or ``wall/gran granular``.
+    """Write a contact with its terms and the words for each law, after ``pair_coeff`` or ``granular``.
 
-    Parameters
-    ----------
-    terms
-        Terms of the contact by name.
-    words
-        LAMMPS' words for each law.
-    surface_energy
-        Surface energy [J/m2] with which it adheres after Derjaguin, Muller and Toporov.
+    With a surface energy [J/m2] it adheres after Derjaguin, Muller and Toporov.
     """
     damping = terms["e"] if "e" in terms else terms["eta_n0"]
     normal = f"hertz/material {terms['E']!r} {damping!r} 0"

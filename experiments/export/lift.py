@@ -1,4 +1,4 @@
-"""The lifted cylinder as the input of another code needs it: templates of grains, walls, rain, phases."""
+"""Lifted cylinder as the input of another code needs it: templates of grains, walls, rain, phases."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from dem_warp import Case, ClumpShape, LiftedCylinder
 from dem_warp.scenes.lifted_cylinder import LiftController
-from dem_warp.scenes.poured_controller import CALM, HEAPED
+from dem_warp.scenes.poured_controller import CALM
 from experiments.export.exporter import ExportedTest
 from experiments.export.sizes import classes_of
 from experiments.io.errors import InputError
@@ -35,12 +35,12 @@ LOOK = 5e-3
 
 @dataclass(frozen=True, eq=False)
 class Template:
-    """One of the grains that stand for the population: a shape at a size."""
+    """Grain that represents a part of the population: a shape at a size."""
 
     shape: ClumpShape
     size: float
     fraction: float
-    """Part of the number of grains."""
+    """Share of the number of grains."""
     density: float
 
     @property
@@ -71,12 +71,12 @@ class Template:
 
 @dataclass(frozen=True)
 class Lift:
-    """A lifted cylinder with what follows from its case.
+    """Lifted cylinder and the numbers that follow from its case.
 
     Raises
     ------
     InputError
-        When the test is another one.
+        When the test is of another kind.
     """
 
     test: ExportedTest
@@ -84,7 +84,7 @@ class Lift:
     def __post_init__(self) -> None:
         scene = self.test.case.scene
         if not isinstance(scene, LiftedCylinder):
-            rule = "the test must be a lifted-cylinder, the only one that is exported"
+            rule = "the test must be a lifted-cylinder: no other is exported"
             raise InputError(self.test.source, rule, getattr(scene, "name", type(scene).__name__))
 
     @property
@@ -109,7 +109,7 @@ class Lift:
 
     @property
     def is_of_spheres(self) -> bool:
-        """True where every grain is one sphere."""
+        """Whether every grain is one sphere."""
         return all(template.shape.sphere_count == 1 for template in self.templates)
 
     @property
@@ -128,7 +128,7 @@ class Lift:
         return 0.4 * min(float(template.radii.mean()) for template in self.templates)
 
     def seeds(self, count: int) -> tuple[int, ...]:
-        """Draw distinct primes above 10000, the same from the same seed of the case."""
+        """Draw distinct primes above 10000 from the seed of the case."""
         drawn = np.random.default_rng([self.case.seed, FIRST_SEED]).integers(FIRST_SEED, 10**7, count)
         seeds: list[int] = []
         for number in drawn.tolist():
@@ -138,10 +138,8 @@ class Lift:
         return tuple(seeds)
 
     def steps(self, time: float) -> int:
-        """Steps that a time [s] takes."""
+        """Return the number of steps of a time [s]."""
         return max(round(time / self.case.time_step), 1)
-
-    # ---- the rain ----------------------------------------------------------------------------------------
 
     @property
     def count(self) -> int:
@@ -175,32 +173,15 @@ class Lift:
         area = math.pi * max(self.rain_radius - self.reach, 0.3 * self.rain_radius) ** 2
         return min(self.scene.rain_rate, RAIN_DENSITY * self.scene.rain_speed * area / volume)
 
-    # ---- the phases ----------------------------------------------------------------------------------------
-
     @property
     def fill_limit(self) -> float:
         """Time after which the filling has failed [s]."""
         return self.count / self.rain_rate + LiftController.FILL_MARGIN
 
     @property
-    def settle_limit(self) -> float:
-        """Time after which the settling has failed [s]."""
-        return LiftController.SETTLE_LIMIT
-
-    @property
-    def rest_limit(self) -> float:
-        """Time after the tube's rise by its height in which the heap must come to rest [s]."""
-        return LiftController.LIFT_MARGIN
-
-    @property
     def calm_speed(self) -> float:
-        """No grain at rest passes it [m/s]."""
+        """Speed that no grain at rest exceeds [m/s]."""
         return CALM * self.scene.rest_speed
-
-    @property
-    def heaped(self) -> int:
-        """Slow grains above the rim that show the tube to be full."""
-        return HEAPED
 
     @property
     def strike(self) -> float:
@@ -220,13 +201,7 @@ class Lift:
 
 
 def prism(radius: float, height: float, sides: int = SIDES) -> np.ndarray:
-    """Triangles of a prism around a tube that stands on z = 0 [m].
-
-    Returns
-    -------
-    numpy.ndarray
-        Corners, (2 sides, 3, 3); the sides touch the tube from outside.
-    """
+    """Return the triangles of a prism around a tube on z = 0, touching it [m], (2 sides, 3, 3)."""
     turns = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     corner = radius / np.cos(np.pi / sides)
     low = np.column_stack([corner * np.cos(turns), corner * np.sin(turns), np.zeros(sides)])
@@ -237,7 +212,7 @@ def prism(radius: float, height: float, sides: int = SIDES) -> np.ndarray:
 
 
 def disc(radius: float, sides: int = SIDES) -> np.ndarray:
-    """Triangles of a regular polygon at z = 0 whose area is that of a disc [m], (sides, 3, 3)."""
+    """Return the triangles of a regular polygon at z = 0 with the area of a disc [m], (sides, 3, 3)."""
     turns = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     corner = radius * math.sqrt(2.0 * np.pi / (sides * math.sin(2.0 * np.pi / sides)))
     rim = np.column_stack([corner * np.cos(turns), corner * np.sin(turns), np.zeros(sides)])

@@ -101,7 +101,7 @@ def _walls(lift: Lift, model: str) -> str:
 
 
 def _filling(lift: Lift) -> list[str]:
-    settle = rest_loop(lift, "settle", lift.settle_limit, _QUIT)
+    settle = rest_loop(lift, "settle", _QUIT)
     if lift.scene.grain_count is not None:
         steps = lift.steps(lift.count / lift.rain_rate + lift.rain_period)
         return [_FILL_COUNT.format(steps=steps), settle]
@@ -122,7 +122,7 @@ def _lifting(lift: Lift) -> list[str]:
     looks = max(round(scene.lift_time / LOOK), 1)
     loop = clear_loop(look, looks, lift.largest_radius, f"variable rise equal ${{rise}}+{rise:.9g}\n")
     lifting = _LIFT.format(speed=scene.lift_speed, loop=loop)
-    return [lifting, rest_loop(lift, "rest", lift.rest_limit, _QUIT), _END]
+    return [lifting, rest_loop(lift, "rest", _QUIT), _END]
 
 
 LIGGGHTS = code_exporter("liggghts", translate)

@@ -55,16 +55,8 @@ def head(
 ) -> str:
     """Write the first commands, up to the neighbour lists.
 
-    Parameters
-    ----------
-    types
-        Names of the types of atoms.
-    box
-        Lower and upper side along x, y and z [m].
-    skin, bin_size
-        Reach of the neighbour lists beyond contact, and the side of their bins [m]; 0 leaves it to LIGGGHTS.
-    sort
-        Words on the sorting of atoms.
+    `types` names the types of atoms, `box` has its lower and upper side along x, y and z [m]. The lists reach
+    `skin` beyond contact, in bins of a side [m]; 0 leaves it to LIGGGHTS. `sort` are words on sorting.
     """
     return _HEAD.format(
         sort=f" {sort}" if sort else "",
@@ -119,14 +111,8 @@ def grain_template(number: int, template: Template, seed: int, atom_type: int = 
 def pouring(kinds: Sequence[tuple[Template, float, int]], rain: Rain, seeds: Sequence[int]) -> str:
     """Write the templates and the rain of grains.
 
-    Parameters
-    ----------
-    kinds
-        Templates, their parts of the number of grains and their types of atoms.
-    rain
-        Space, number and rate of the grains.
-    seeds
-        Primes: two, and one for each template.
+    `kinds` are templates with their share of the number of grains and their type of atom; `seeds` are primes,
+    two and one for each template.
     """
     sizes_seed, rain_seed, *own = seeds
     words = [

@@ -1,8 +1,4 @@
-"""The lifted cylinder as a program of another code reads it: the same grains in the same rain, all numbers.
-
-Codes that are driven by a program can place every grain, so that their rain is ours: the same sizes, shapes,
-orientations and places, grain by grain, released at the same times.
-"""
+"""Lifted cylinder for codes that a program drives: the same grains at the same places and times."""
 
 from __future__ import annotations
 
@@ -119,22 +115,10 @@ def program_translation(
     rows: Sequence[Translated],
     walls: Mapping[str, str] | None = None,
 ) -> Translation:
-    """Write a Python program: its head, the course of the test and the part of a solver, with its files.
+    """Write a Python program: its head, the course of the test and the template of a solver, with its files.
 
-    Parameters
-    ----------
-    test, world
-        The test, and the world of its case.
-    solver
-        Name of the template.
-    command
-        Command that runs the program.
-    numbers
-        Numbers that the program reads besides those of the test.
-    rows
-        Rows of the README.
-    walls
-        Texts of further files by name.
+    `numbers` are those that it reads besides the test's, `rows` belong to the README, `walls` are texts of
+    further files.
     """
     reads = f"Reads {TEST_FILE}, {RAIN_FILE} and the clumps; writes {HEAP}."
     about = f'"""Lifted cylinder in {test.exporter.code}. {reads}"""\n'

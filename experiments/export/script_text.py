@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from dem_warp.scenes.lifted_cylinder import LiftController
+from dem_warp.scenes.poured_controller import HEAPED
 from experiments.export.lift import LOOK, Lift
 
 HEAP_FILE = "heap.dump"
@@ -114,7 +116,7 @@ def fill_loop(lift: Lift, run: str, quit: str) -> str:
     return _FILL.format(
         looks=max(round(lift.fill_limit / LOOK), 1),
         run=run,
-        heaped=lift.heaped * min(template.shape.sphere_count for template in lift.templates),
+        heaped=HEAPED * min(template.shape.sphere_count for template in lift.templates),
         limit=lift.fill_limit,
         quit=quit,
     )
@@ -128,15 +130,16 @@ def clear_loop(look: int, looks: int, clearance: float, rise: str = "") -> str:
     return _CLEAR.format(look=look, looks=looks, clearance=clearance, rise=rise)
 
 
-def rest_loop(lift: Lift, name: str, limit: float, quit: str, look: int | None = None) -> str:
-    """Write the loop until rest, which ends the program after a time limit [s].
+def rest_loop(lift: Lift, name: str, quit: str, look: int | None = None) -> str:
+    """Write the loop until rest after the filling, ``settle``, or after the lift, ``rest``.
 
-    `quit` is the code's word for that; `look` as in `watched`.
+    At its time limit the program ends by the command `quit`; `look` as in `watched`.
     """
     look_time = LOOK if look is None else look * lift.case.time_step
+    limit = LiftController.SETTLE_LIMIT if name == "settle" else LiftController.LIFT_MARGIN
     return _REST.format(
         name=name,
-        look=lift.steps(LOOK) if look is None else look,
+        look=look or lift.steps(LOOK),
         rest_time=lift.scene.rest_time,
         calm_looks=_count(lift.scene.rest_time / look_time),
         limit=limit,

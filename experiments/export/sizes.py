@@ -1,4 +1,4 @@
-"""A few classes of size in place of a continuous spread, for codes that know templates of grains."""
+"""Classes of size in place of a continuous spread, for codes with templates of grains."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NODES = 200
 
 
 def classes_of(grains: GrainPopulation) -> tuple[tuple[float, float], ...]:
-    """Sizes of a population, and the part of the number of grains that each stands for."""
+    """Return the sizes of a population, and the share of the number of grains of each."""
     if grains.classes is None:
         return size_classes(grains.size_mean, grains.size_sd)
     return tuple(zip(grains.classes.sizes, grains.classes.fractions, strict=True))
@@ -30,17 +30,11 @@ def sizes_text(grains: GrainPopulation) -> str:
 
 
 def size_classes(mean: float, sd: float, count: int = CLASSES) -> tuple[tuple[float, float], ...]:
-    """Sizes, and the part of the number of grains that each stands for.
+    """Return sizes, and the share of the number of grains of each.
 
     They are the nodes and weights of the Gauss quadrature of the normal distribution that a population draws
-    its sizes from, cut at its limit: mean and variance of the sizes and mean mass are the population's.
-
-    Parameters
-    ----------
-    mean, sd
-        Those of the population, the second before the cut; 0 gives one class.
-    count
-        Classes.
+    its sizes from, cut at its limit: mean and variance of the sizes and mean mass are the population's. An
+    `sd`, before the cut, of 0 gives one class.
 
     References
     ----------

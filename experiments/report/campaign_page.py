@@ -7,7 +7,6 @@ from typing import Any
 
 from experiments.calibrate.results import STAGES, Campaign, Outcome
 from experiments.report.cautions import cautions
-from experiments.report.companion import Replay, companion_of
 from experiments.report.kit import html
 from experiments.report.other_codes import other_codes_chapter
 from experiments.report.paper_text import pastes
@@ -15,6 +14,7 @@ from experiments.report.pictures import HeapPicture
 from experiments.report.sections import TITLES, Context, chapter, failed_chapter, stage_chapters
 from experiments.report.solid import SolidHeap
 from experiments.report.stage_tables import values_table
+from experiments.report.study_companion import companion_of
 from experiments.report.study_facts import study_facts
 from experiments.report.verdict import HEADLINES, verdict_sentence
 from experiments.studyfile import Study
@@ -25,7 +25,6 @@ def render_page(
     study: Study,
     pictures: Sequence[HeapPicture] = (),
     provenance: Mapping[str, Any] | None = None,
-    replay: Replay | None = None,
     solid: SolidHeap | None = None,
 ) -> str:
     """Render the report of a campaign as one self-contained HTML page.
@@ -38,14 +37,11 @@ def render_page(
         Heaps to show.
     provenance
         What made the numbers: names and values, nested as they come.
-    replay
-        Published runs simulated again, to be shown beside.
     solid
         A heap to be turned.
     """
-    companion = companion_of(study)
     labels = study.labels
-    context = Context(campaign, labels, companion.published())
+    context = Context(campaign, labels)
     chapters = [chapter("heaps")] if pictures or solid else []
     chapters += stage_chapters(context)
     values = None
@@ -53,8 +49,7 @@ def render_page(
         values = values_table(campaign, campaign.optimum, labels)
         chapters += [other_codes_chapter(study, campaign.optimum), chapter("paper_text")]
     chapters.append(failed_chapter(campaign))
-    chapters += replay.chapters(campaign) if replay else ()
-    chapters += [*companion.campaign_chapters(campaign), chapter("provenance")]
+    chapters += [*companion_of(study).campaign_chapters(campaign), chapter("provenance")]
     drawn_on = {
         "campaign": campaign,
         "study": study,
@@ -66,7 +61,6 @@ def render_page(
         "solid": solid,
         "calibrated": campaign.outcome is Outcome.CALIBRATED,
         "unreached": [TITLES[name] for name in STAGES if name not in campaign.stages],
-        "published": context.published,
         "leading": context.leading,
         "labels": labels,
         "facts": study_facts(study),

@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from experiments.calibrate.results import Campaign
-from experiments.measurement.filling import filling_missed, filling_reached, filling_text
+from experiments.measurement.filling import filling_missed, filling_reached, filling_told
 from experiments.report.kit.numbers import capital, enumeration, fixed
+from experiments.report.kit.texts import say
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 
@@ -53,11 +54,7 @@ def study_cautions(study: Study) -> list[Caution]:
 
 def _twin(campaign: Campaign, study: Study) -> Iterator[Caution]:
     if campaign.target is not None and campaign.target.truth is not None:
-        yield Caution(
-            "The target was simulated, not measured. This run tests the method; its values are not those of "
-            "a material.",
-            "target",
-        )
+        yield Caution(say("caution.twin"), "target")
 
 
 def _heaps(campaign: Campaign, study: Study) -> Iterator[Caution]:
@@ -75,20 +72,12 @@ def _filling(campaign: Campaign, study: Study) -> Iterator[Caution]:
         scene = study.case({}, 0, str(name)).scene
         reached = filling_reached(scene, {"fill_height": float(rows["fill_height"].median())})
         if reached is not None and filling_missed(scene, reached):
-            yield Caution(
-                f"The drum was filled otherwise than stated: {filling_text(scene, reached)}. Change filling, "
-                "or count the grains (grain_count).",
-                "summary",
-            )
+            yield Caution(say("caution.filling", told=filling_told(scene, reached)), "summary")
 
 
 def _small(grains: float | None) -> Iterator[Caution]:
     if grains and grains < FEW_GRAINS:
-        yield Caution(
-            f"Each heap has fewer than {FEW_GRAINS} grains. So small a heap stands flatter and scatters more "
-            "than a large one; its values may not carry over.",
-            "summary",
-        )
+        yield Caution(say("caution.small", few=FEW_GRAINS), "summary")
 
 
 def _narrow(study: Study) -> Iterator[Caution]:
@@ -96,17 +85,9 @@ def _narrow(study: Study) -> Iterator[Caution]:
         yield Caution(f"{capital(narrow).rstrip('.')}.", "summary")
 
 
-def _modulus(campaign: Campaign, study: Study) -> Iterator[Caution]:
-    yield from _softened(study)
-
-
 def _softened(study: Study) -> Iterator[Caution]:
     if study.numerics.modulus_scale != 1.0:
-        yield Caution(
-            "The shear modulus was softened. Use the values with the same softened modulus, or verify them "
-            "again with the real one.",
-            "provenance",
-        )
+        yield Caution(say("caution.softened"), "provenance")
 
 
 def _open_region(campaign: Campaign, study: Study) -> Iterator[Caution]:
@@ -114,15 +95,12 @@ def _open_region(campaign: Campaign, study: Study) -> Iterator[Caution]:
     if optimum is None:
         return
     if not optimum.region.mask.any():
-        yield Caution("No setting that was explored agrees with every response.", "optimum")
+        yield Caution(say("caution.nothing_agrees"), "optimum")
     elif optimum.unidentified:
         names = enumeration(f"{study.labels[name]} ({name})" for name in optimum.unidentified)
         what = "These responses leave" if optimum.joint else "The target alone leaves"
-        yield Caution(
-            f"The compatible region is wide: {fixed(100.0 * optimum.region.fraction, 0)} % of the settings "
-            f"that were explored fit as well. {what} open {names}. Another kind of test narrows it.",
-            "optimum",
-        )
+        share = fixed(100.0 * optimum.region.fraction, 0)
+        yield Caution(say("caution.wide_region", share=share, what=what, names=names), "optimum")
 
 
 def _poor_surface(campaign: Campaign, study: Study) -> Iterator[Caution]:
@@ -132,18 +110,10 @@ def _poor_surface(campaign: Campaign, study: Study) -> Iterator[Caution]:
         fit = found.reduced
         predicted, adjusted = fit.r2_predicted, fit.r2_adjusted
         if predicted < POOR_PREDICTION or adjusted - predicted > PREDICTION_GAP:
-            yield Caution(
-                f"The surface of the {name} predicts new runs poorly: its predicted R² is "
-                f"{fixed(predicted, 2)}, its adjusted R² {fixed(adjusted, 2)}. Add replicates, or widen the "
-                "design.",
-                "surface",
-            )
+            numbers = {"predicted": fixed(predicted, 2), "adjusted": fixed(adjusted, 2)}
+            yield Caution(say("caution.poor_prediction", name=name, **numbers), "surface")
         if found.full.anova["p"]["lack of fit"] < study.campaign.surface.lack_of_fit_alpha:
-            yield Caution(
-                f"A quadratic is too simple for the {name}: its lack of fit is significant. Shrink the "
-                "design.",
-                "surface",
-            )
+            yield Caution(say("caution.lack_of_fit", name=name), "surface")
 
 
 def _beyond_ranges(campaign: Campaign, study: Study) -> Iterator[Caution]:
@@ -152,21 +122,14 @@ def _beyond_ranges(campaign: Campaign, study: Study) -> Iterator[Caution]:
     for factor in study.factors:
         value = campaign.optimum.point.get(factor.name, factor.center)
         if not factor.low <= value <= factor.high:
-            yield Caution(
-                f"The value of {study.labels[factor.name]} ({factor.name}) lies outside the range that the "
-                "study states.",
-                "factors",
-            )
+            label = study.labels[factor.name]
+            yield Caution(say("caution.beyond", label=label, name=factor.name), "factors")
 
 
 def _thin_target(campaign: Campaign, study: Study) -> Iterator[Caution]:
     for name, sample in (campaign.target.responses if campaign.target else {}).items():
         if sample.n < FEW_MEASUREMENTS:
-            yield Caution(
-                f"The target of the {name} rests on fewer than {FEW_MEASUREMENTS} measurements: its scatter "
-                "is hardly known.",
-                "target",
-            )
+            yield Caution(say("caution.thin_target", name=name, few=FEW_MEASUREMENTS), "target")
 
 
 def _wide_margin(campaign: Campaign, study: Study) -> Iterator[Caution]:
@@ -175,16 +138,13 @@ def _wide_margin(campaign: Campaign, study: Study) -> Iterator[Caution]:
     for name, test in campaign.verification.responses.items():
         aim = abs(campaign.target.responses[name].mean)
         if test.equivalent and (test.margin or 0.0) > WIDE_MARGIN * aim:
-            yield Caution(
-                f"The margin within which the {name} is shown to agree is wide: more than "
-                f"{fixed(100.0 * WIDE_MARGIN, 0)} % of the target.",
-                "verification",
-            )
+            share = fixed(100.0 * WIDE_MARGIN, 0)
+            yield Caution(say("caution.wide_margin", name=name, share=share), "verification")
 
 
 def _failed(campaign: Campaign, study: Study) -> Iterator[Caution]:
     if lost := len(campaign.failed_cases):
-        yield Caution(f"{lost} of the cases failed, or lack{'s' if lost == 1 else ''} a response.", "failed")
+        yield Caution(say("caution.failed", lost=lost, s="s" if lost == 1 else ""), "failed")
 
 
 _RULES: tuple[Callable[[Campaign, Study], Iterator[Caution]], ...] = (
@@ -193,7 +153,7 @@ _RULES: tuple[Callable[[Campaign, Study], Iterator[Caution]], ...] = (
     _filling,
     _open_region,
     _poor_surface,
-    _modulus,
+    lambda campaign, study: _softened(study),
     _wide_margin,
     _thin_target,
     _beyond_ranges,

@@ -15,6 +15,7 @@ from experiments.report.kit.latex import latex_table, latex_text
 from experiments.report.kit.markdown import markdown_table
 from experiments.report.kit.numbers import enumeration, fixed, p_clause, quantity, significant
 from experiments.report.kit.table import Layout, Table, columns, make_table
+from experiments.report.kit.texts import say
 from experiments.report.study_facts import study_facts
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
@@ -60,10 +61,7 @@ def methods_paragraph(campaign: Campaign, study: Study, provenance: Mapping[str,
     for part in (_designs, _choice, _verification):
         sentences += part(campaign, study)
     lost = len(campaign.failed_cases)
-    sentences.append(
-        f"In all, {len(campaign.cases)} cases were simulated, of which {lost or 'none'} failed or gave no "
-        "measurement."
-    )
+    sentences.append(say("methods.lost", count=len(campaign.cases), lost=lost or "none"))
     return " ".join(sentences)
 
 
@@ -91,11 +89,7 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
         *columns(explored="range explored", value="value", compatible="compatible range"),
     ]
     level = fixed(100.0 * campaign.settings.optimum.confidence, 0)
-    note = (
-        f"Compatible: fit and target agree at the {level} % level. Not every combination of compatible "
-        "values is compatible."
-    )
-    caption = "Contact parameters, as calibrated."
+    caption, note = "Contact parameters, as calibrated.", say("note.paper", level=level)
     return make_table("paper", pd.DataFrame(rows), shown, caption, note)
 
 
@@ -103,16 +97,14 @@ def simulated_sentences(study: Study) -> Iterator[str]:
     """Say what was simulated, and how its heaps were measured."""
     facts, density = study_facts(study), str(study.document["grain"].get("density", "as in the study"))
     test = facts.get("Test", f"a lifted cylinder ({facts.get('Tube')}; lifted at {facts.get('Lift')})")
-    yield f"The test was {test}, with {facts['Grains']} (density {_units(density)})."
+    yield say("methods.test", test=test, grains=facts["Grains"], density=_units(density))
     modulus = facts["Shear modulus"]
     softened = "was not softened" if modulus == "real" else f"was {modulus}"
     laws = "Hertz and Mindlin's law without slip, with EDEM's damping and rolling friction"
     if study.solver.laws != EDEM:
         laws = f"the laws of {facts['Contact laws']}"
-    yield (
-        f"Contacts followed {laws}; the shear modulus {softened}, and the time step was {facts['Time step']}."
-    )
-    yield f"The repose angle was read with the {facts['Angle']}."
+    yield say("methods.laws", laws=laws, softened=softened, step=facts["Time step"])
+    yield say("methods.angle", angle=facts["Angle"])
 
 
 def _designs(campaign: Campaign, study: Study) -> Iterator[str]:
@@ -120,19 +112,14 @@ def _designs(campaign: Campaign, study: Study) -> Iterator[str]:
     if screening is None or selection is None or climb is None or campaign.surface is None:
         return
     kind = campaign.settings.screening.design.replace("-", " ").title().replace(" ", "–")
-    yield (
-        f"A {kind} design of {len(screening.design.coded)} runs, {len(screening.cases)} cases, screened "
-        f"{len(campaign.factors)} parameters."
-    )
+    runs, cases, factors = len(screening.design.coded), len(screening.cases), len(campaign.factors)
+    yield say("methods.screening", kind=kind, runs=runs, cases=cases, factors=factors)
     kept = enumeration(study.labels[name] for name in selection.kept)
-    yield f"A path of steepest ascent of {len(climb.path)} steps along {kept} led towards the target."
+    yield say("methods.climb", steps=len(climb.path), kept=kept)
     fit = campaign.surface.leading
-    yield (
-        f"A central composite design of {len(campaign.surface.design.coded)} runs gave a quadratic response "
-        f"surface, reduced by backward elimination (R² = {fixed(fit.reduced.r2, 2)}, predicted R² = "
-        f"{fixed(fit.reduced.r2_predicted, 2)}; lack of fit p "
-        f"{p_clause(fit.full.anova['p']['lack of fit'])})."
-    )
+    r2, predicted = fixed(fit.reduced.r2, 2), fixed(fit.reduced.r2_predicted, 2)
+    runs, p = len(campaign.surface.design.coded), p_clause(fit.full.anova["p"]["lack of fit"])
+    yield say("methods.surface", runs=runs, r2=r2, predicted=predicted, p=p)
 
 
 def _choice(campaign: Campaign, study: Study) -> Iterator[str]:
@@ -149,11 +136,9 @@ def _choice(campaign: Campaign, study: Study) -> Iterator[str]:
         f"{_words(one)} {_sample(target.responses[one.name], one)}, {source}" for one in campaign.responses
     )
     share = fixed(100.0 * optimum.region.fraction, 0)
-    yield f"The target was {aims}."
-    yield (
-        f"The calibrated values are {values}; {share} % of the settings explored agree with the target at "
-        f"the {fixed(100.0 * campaign.settings.optimum.confidence, 0)} % level."
-    )
+    level = fixed(100.0 * campaign.settings.optimum.confidence, 0)
+    yield say("methods.target", aims=aims)
+    yield say("methods.choice", values=values, share=share, level=level)
 
 
 def _verification(campaign: Campaign, study: Study) -> Iterator[str]:
@@ -162,11 +147,16 @@ def _verification(campaign: Campaign, study: Study) -> Iterator[str]:
     for response in campaign.responses:
         test, unit = campaign.verification.responses[response.name], response.unit
         level, ends = fixed(100.0 * (1.0 - test.alpha), 0), [quantity(end, unit) for end in test.interval]
-        yield (
-            f"Fresh cases at these values gave {_words(response)} {_sample(test.a, response)}: a difference "
-            f"of {quantity(test.difference, unit)} ({level} % interval {' to '.join(ends)}; Welch's t-test, "
-            f"p {p_clause(test.p)}; two one-sided tests of equivalence within ± "
-            f"{quantity(test.margin, unit)}, p {p_clause(test.equivalence_p)})."
+        yield say(
+            "methods.verification",
+            what=_words(response),
+            sample=_sample(test.a, response),
+            difference=quantity(test.difference, unit),
+            level=level,
+            ends=" to ".join(ends),
+            p=p_clause(test.p),
+            margin=quantity(test.margin, unit),
+            p_equivalence=p_clause(test.equivalence_p),
         )
 
 
@@ -175,10 +165,8 @@ def _units(text: str) -> str:
 
 
 def _sample(sample: Any, response: Response) -> str:
-    return (
-        f"{quantity(sample.mean, response.unit)} (standard deviation {quantity(sample.sd, response.unit)}, "
-        f"n = {sample.n})"
-    )
+    mean, sd = quantity(sample.mean, response.unit), quantity(sample.sd, response.unit)
+    return say("methods.sample", mean=mean, sd=sd, n=sample.n)
 
 
 def _words(response: Response) -> str:

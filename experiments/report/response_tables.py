@@ -13,6 +13,7 @@ from experiments.calibrate.joint import direction_text, open_directions
 from experiments.calibrate.results import Campaign, ScreeningResult, SurfaceResult
 from experiments.report.kit.numbers import term, unit_sign
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
+from experiments.report.kit.texts import say
 from experiments.studyfile.campaign import TARGET_SCENE, OptimumSettings, Response
 
 
@@ -101,12 +102,8 @@ def _shrinkage_table(campaign: Campaign, joint: JointFit) -> Table:
         Column("simulated_time", "simulated", "count", "s"),
         Column("work", "share of the work", "percent", "%"),
     ]
-    note = (
-        "Shares of the region that the design explored. Responses stand in the order in which they shrink it "
-        "most; one that is measured in a scene that is simulated anyway takes no cases. Work: grains times "
-        "simulated time."
-    )
-    return make_table("shrinkage", table, shown, "What each response buys, and what it takes.", note)
+    caption = "What each response buys, and what it takes."
+    return make_table("shrinkage", table, shown, caption, say("note.shrinkage"))
 
 
 def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
@@ -124,12 +121,8 @@ def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
         Column("span", "compatible span", "percent", "%"),
         Column("open", "verdict"),
     ]
-    note = (
-        f"Half width: of the {100.0 * (1.0 - joint.alpha):g} % interval along the direction, from the slopes "
-        "at the point of the smallest chi²; without a number no response changes there. Span: of the "
-        f"compatible region, over that of the region explored; open above "
-        f"{100.0 * settings.unidentified_span:g} %."
-    )
+    level, span = 100.0 * (1.0 - joint.alpha), 100.0 * settings.unidentified_span
+    note = say("note.directions", level=level, span=span)
     marks = ["chosen" if direction in left else "" for direction in table.index]
     caption = "Directions of the factors, the best known first."
     return make_table("directions", table, shown, caption, note, marks)

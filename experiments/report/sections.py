@@ -22,7 +22,6 @@ from experiments.report.joint_charts import joint_charts
 from experiments.report.kit.chart import Chart
 from experiments.report.kit.html import Chapter
 from experiments.report.kit.table import Table
-from experiments.report.published import Published
 from experiments.report.response_tables import response_tables
 from experiments.studyfile.campaign import Response
 
@@ -58,8 +57,6 @@ class Context:
     campaign: Campaign
     labels: Mapping[str, str]
     """Meaning of each factor, in words."""
-    published: Published | None
-    """Published numbers of the same study, where there are some."""
 
     @property
     def leading(self) -> Response:
@@ -115,11 +112,10 @@ def _noise_floor(context: Context, result: NoiseFloorResult) -> Chapter:
 
 def _screening(context: Context, result: ScreeningResult) -> Chapter:
     alpha = context.campaign.settings.selection.alpha
-    published = context.published.screening if context.published else None
     screen, response = result.leading.screen, context.leading
     tables = {
         "design": stage_tables.screening_design_table(result, context.campaign.responses),
-        "effects": stage_tables.effects_table(screen, response, context.labels, alpha, published),
+        "effects": stage_tables.effects_table(screen, response, context.labels, alpha),
         "anova": stage_tables.anova_table("screening-anova", screen.anova, "Analysis of variance."),
     }
     drawn = (charts.pareto_chart, charts.half_normal_chart)
@@ -132,24 +128,17 @@ def _selection(context: Context, result: SelectionResult) -> Chapter:
 
 def _climb(context: Context, result: ClimbResult) -> Chapter:
     tables = {"path": stage_tables.climb_table(result, context.leading)}
-    if context.published:
-        tables["paper"] = stage_tables.paper_climb_table(context.published.climb)
     return chapter("climb", tables, [charts.climb_chart(result, context.target, context.leading)])
 
 
 def _surface(context: Context, result: SurfaceResult) -> Chapter:
     campaign, response = context.campaign, context.leading
-    fit, names = result.leading, tuple(result.design.names)
-    published = context.published
-    if published is not None and set(published.kept) != set(names):
-        published = None
-    paper = {model: published.anova(model, names) if published else None for model in ("full", "reduced")}
-    full, reduced, anova_table = fit.full.anova, fit.reduced.anova, stage_tables.anova_table
+    fit, anova_table = result.leading, stage_tables.anova_table
     tables = {
         "design": stage_tables.surface_design_table(result, campaign.responses),
-        "full": anova_table("anova-full", full, "Full quadratic model.", paper["full"]),
-        "reduced": anova_table("anova-reduced", reduced, "Reduced model.", paper["reduced"]),
-        "quality": stage_tables.quality_table(fit, published),
+        "full": anova_table("anova-full", fit.full.anova, "Full quadratic model."),
+        "reduced": anova_table("anova-reduced", fit.reduced.anova, "Reduced model."),
+        "quality": stage_tables.quality_table(fit),
         "coefficients": stage_tables.coefficients_table(fit.reduced, response),
     }
     outside = stage_tables.outside_table(result)
@@ -176,7 +165,8 @@ def _responses(context: Context) -> list[Chapter]:
 def _verification(context: Context, result: VerificationResult) -> Chapter:
     caption, responses = "Fresh cases at the chosen point.", context.campaign.responses
     table = stage_tables.cases_table("verification-cases", result.cases, responses, caption)
-    tests = stage_tables.tests_table(result, responses, context.published)
+    units = {response.name: response.unit for response in responses}
+    tests = stage_tables.differences_table({name: result.responses[name] for name in units}, units)
     chart = charts.verification_chart(result, context.leading)
     return chapter("verification", {"cases": table, "tests": tests}, [chart])
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from doe import Comparison, Factor, ScreenResult, Surface, compare_means
+from doe import Comparison, Factor, ScreenResult, Surface
 from experiments.calibrate.results import (
     Campaign,
     ClimbResult,
@@ -16,19 +16,25 @@ from experiments.calibrate.results import (
     ScreeningResult,
     SelectionResult,
     SurfaceResult,
-    VerificationResult,
     failed,
 )
 from experiments.report.kit.numbers import unit_sign
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
-from experiments.report.published import QUALITY, Published, quality_of
+from experiments.report.kit.texts import say
 from experiments.studyfile.campaign import TARGET_SCENE, Response
 
 SIGNIFICANT = 0.05
 """Rows of an analysis of variance with p below this are marked."""
 
 ERROR_PERCENT = Column("error_percent", "relative error", "ratio", "%")
-PAPER_TEST = (Column("paper_F", "paper, F", "ratio"), Column("paper_p", "paper, p", "p"))
+QUALITY = {
+    "r2": "R²",
+    "r2_adjusted": "R² adjusted",
+    "r2_predicted": "R² predicted",
+    "cv_percent": "coefficient of variation [%]",
+    "adequate_precision": "adequate precision (above 4 is wanted)",
+}
+"""Measures of a fit by their names in ``Surface``."""
 
 
 def response_column(response: Response, key: str, head: str = "") -> Column:
@@ -105,33 +111,21 @@ def screening_design_table(result: ScreeningResult, responses: Sequence[Response
     return make_table("screening-design", frame, ["run", *coded, *measured], caption, note)
 
 
-def effects_table(
-    screen: ScreenResult,
-    response: Response,
-    labels: Mapping[str, str],
-    alpha: float,
-    published: pd.DataFrame | None,
-) -> Table:
-    """Lay out the tests of the effects, strongest first, the paper's F and p beside them."""
+def effects_table(screen: ScreenResult, response: Response, labels: Mapping[str, str], alpha: float) -> Table:
+    """Lay out the tests of the effects, strongest first."""
     frame = screen.table.sort_values("rank")
     frame.insert(0, "label", [labels.get(str(name), "") for name in frame.index])
-    if published is not None:
-        frame = frame.join(published[["F", "p"]].add_prefix("paper_"))
     effect, share = response_column(response, "effect", "effect"), Column("percent", "share", "percent", "%")
     parameter = Column("label", "parameter")
-    shown: Layout = ["rank", "factor", parameter, effect, "sum_sq", share, "F", "t", "p", *PAPER_TEST]
+    shown: Layout = ["rank", "factor", parameter, effect, "sum_sq", share, "F", "t", "p"]
     note = f"Marked: p < {alpha:g}. The effect is the change of the mean {response.name} from low to high."
-    if published is not None:
-        note += " The paper's columns are recomputed from its printed runs."
     caption = f"Effects of the factors on the {response.name}."
     return make_table("effects", frame, shown, caption, note, p_marks(frame["p"], alpha))
 
 
-def anova_table(name: str, anova: pd.DataFrame, caption: str, published: pd.DataFrame | None = None) -> Table:
-    """Lay out an analysis of variance, the paper's F and p beside it."""
-    if published is not None:
-        anova = anova.join(published[["F", "p"]].add_prefix("paper_")).rename_axis("source")
-    shown: Layout = ["source", "df", "sum_sq", "mean_sq", "F", "p", *PAPER_TEST]
+def anova_table(name: str, anova: pd.DataFrame, caption: str) -> Table:
+    """Lay out an analysis of variance."""
+    shown: Layout = ["source", "df", "sum_sq", "mean_sq", "F", "p"]
     note, marks = f"Marked: p < {SIGNIFICANT}.", p_marks(anova["p"])
     return make_table(name, anova, shown, caption, note, marks)
 
@@ -167,13 +161,6 @@ def climb_table(result: ClimbResult, response: Response) -> Table:
     marks = ["chosen" if step == result.best_step else "" for step in result.path.index]
     note = "Marked: the step nearest to the target."
     return make_table("climb", result.path, shown, "The climb, step by step.", note, marks)
-
-
-def paper_climb_table(path: pd.DataFrame) -> Table:
-    """Lay out the paper's climb."""
-    factors = [Column(name, name, "value") for name in path.columns.drop(["angle", "error_percent"])]
-    shown: Layout = ["step", *factors, *columns("angle", "°", angle="angle"), ERROR_PERCENT]
-    return make_table("paper-climb", path, shown, "The paper's climb.")
 
 
 def surface_design_table(result: SurfaceResult, responses: Sequence[Response]) -> Table:
@@ -212,13 +199,16 @@ def coefficients_table(surface: Surface, response: Response) -> Table:
     return make_table("coefficients", frame, shown, "Coefficients of the reduced model.")
 
 
-def quality_table(result: FittedResponse, published: Published | None) -> Table:
-    """Lay out how well both models fit, the paper's beside them."""
-    frame = quality_of({"full": result.full, "reduced": result.reduced}).assign(measure=pd.Series(QUALITY))
-    if published is not None:
-        frame = frame.join(quality_of(published.surfaces).add_prefix("paper_"))
-    paper = {"paper_full": "paper, full", "paper_reduced": "paper, reduced"}
-    shown: Layout = ["measure", *columns("share", full="full", reduced="reduced", **paper)]
+def quality_of(models: Mapping[str, Surface]) -> pd.DataFrame:
+    """Calculate the measures of fits, one column a model."""
+    values = {model: [getattr(fit, name) for name in QUALITY] for model, fit in models.items()}
+    return pd.DataFrame(values, index=list(QUALITY)).assign(measure=pd.Series(QUALITY))
+
+
+def quality_table(result: FittedResponse) -> Table:
+    """Lay out how well both models fit."""
+    frame = quality_of({"full": result.full, "reduced": result.reduced})
+    shown: Layout = ["measure", *columns("share", full="full", reduced="reduced")]
     return make_table("quality", frame, shown, "Quality of the fits.")
 
 
@@ -243,10 +233,9 @@ def values_table(campaign: Campaign, optimum: OptimumResult, labels: Mapping[str
         *columns("free", low="as good from", high="to"),
         Column("how", "how it was found"),
     ]
-    several = " Not every combination inside the ranges is as good: the values trade off against one another."
     marks = ["chosen" if name in chosen else "" for name in frame.index]
     caption = "Calibrated values (marked), and those that every case shared."
-    return make_table("values", frame, shown, caption, several.strip() if len(chosen) > 1 else "", marks)
+    return make_table("values", frame, shown, caption, say("note.values") if len(chosen) > 1 else "", marks)
 
 
 def _how(name: str, optimum: OptimumResult) -> str:
@@ -255,19 +244,16 @@ def _how(name: str, optimum: OptimumResult) -> str:
     return "calibrated, left open" if name in optimum.unidentified else "calibrated"
 
 
-def tests_table(
-    result: VerificationResult, responses: Sequence[Response], published: Published | None
+def differences_table(
+    tests: Mapping[str, Comparison], units: Mapping[str, str], name: str = "tests"
 ) -> Table:
-    """Lay out the tests of the difference from every target, the paper's heaps beside the first."""
-    tests = [(response.name, result.responses[response.name], response.unit) for response in responses]
-    if published is not None:
-        own = compare_means(published.heaps, published.measured, result.leading.margin)
-        tests.insert(1, ("the paper", own, "deg"))
+    """Lay out tests of the difference from a target; tests and units are by response."""
     rows = [
-        {"response": name, "unit": unit_sign(unit), **comparison_facts(test)} for name, test, unit in tests
+        {"response": response, "unit": unit_sign(units[response]), **comparison_facts(test)}
+        for response, test in tests.items()
     ]
-    level = f"{100.0 * (1.0 - result.leading.alpha):.3g} %"
-    kind = "angle" if {unit for _, _, unit in tests} == {"deg"} else "free"
+    level = f"{100.0 * (1.0 - next(iter(tests.values())).alpha):.3g} %"
+    kind = "angle" if {units[response] for response in tests} == {"deg"} else "free"
     shown: Layout = [
         *("response", "unit"),
         *columns(kind, mean="mean", sd="sd"),
@@ -280,8 +266,8 @@ def tests_table(
         *columns("p", equivalence_p="p, equivalent within it"),
         *columns(kind, smallest_margin="smallest margin shown"),
     ]
-    note = "A large p of no difference is weak evidence with few cases; equivalence says how near is shown."
-    return make_table("tests", pd.DataFrame(rows), shown, "Tests of the difference from the target.", note)
+    caption, note = "Tests of the difference from the target.", say("note.differences")
+    return make_table(name, pd.DataFrame(rows), shown, caption, note)
 
 
 def comparison_facts(test: Comparison) -> dict[str, float | None]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from experiments.calibrate.results import Campaign, Outcome
 from experiments.report.kit.numbers import enumeration
+from experiments.report.kit.texts import say
 
 HEADLINES = {
     Outcome.CALIBRATED: "Calibrated",
@@ -26,17 +27,11 @@ def verdict_sentence(campaign: Campaign) -> str:
         return campaign.reason
     tests = campaign.verification.responses
     if missed := [name for name, test in tests.items() if test.different]:
-        return f"Fresh cases with the values below miss the target of {_words(missed)}."
+        return say("ending.missed", names=_words(missed))
     open_ones = [name for name, test in tests.items() if not test.equivalent]
     if open_ones:
-        return (
-            f"Fresh cases with the values below do not differ from the target, but they are too few, or "
-            f"scatter too much, to show that {_words(open_ones)} lies within its margin: add replicates."
-        )
-    return (
-        f"Fresh cases with the values below agree with the target of {_words(tests)}: no difference is "
-        "found, and what may be left of one is shown to lie within the margin."
-    )
+        return say("ending.open", names=_words(open_ones))
+    return say("ending.met", names=_words(tests))
 
 
 def _words(names: Iterable[str]) -> str:

@@ -17,7 +17,6 @@ from experiments.io.files import write_text
 from experiments.io.plain_data import jsonable
 from experiments.io.program_version import program_version
 from experiments.report.campaign_page import render_page
-from experiments.report.companion import Replay
 from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
 from experiments.report.solid import SolidHeap
@@ -35,14 +34,13 @@ def write_report(
     out_dir: str | Path,
     pictures: Sequence[HeapPicture] = (),
     provenance: Mapping[str, Any] | None = None,
-    replay: Replay | None = None,
     solid: SolidHeap | None = None,
 ) -> Path:
     """Write ``report.html``, ``results.json``, ``tables/*.csv``, ``material.toml``, each whole or not at all.
 
     Parameters
     ----------
-    campaign, study, pictures, replay, solid
+    campaign, study, pictures, solid
         As of `render_page`.
     out_dir
         Folder of the files; it is made when it is missing.
@@ -56,9 +54,8 @@ def write_report(
     """
     folder = Path(out_dir)
     made_by = {**(provenance or {}), "study": study_hash(study), "versions": library_versions()}
-    page = render_page(campaign, study, pictures, made_by, replay, solid)
-    tables = campaign.tables() | (replay.tables() if replay else {})
-    write_files(folder, study, page, {"campaign": campaign.to_dict()}, made_by, tables)
+    page = render_page(campaign, study, pictures, made_by, solid)
+    write_files(folder, study, page, {"campaign": campaign.to_dict()}, made_by, campaign.tables())
     write_material_card(campaign, study, folder)
     return folder / PAGE
 

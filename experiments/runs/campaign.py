@@ -30,8 +30,8 @@ from experiments.io.plain_data import jsonable
 from experiments.journal.journal import Journal
 from experiments.measurement.target import with_measurements
 from experiments.report import heap_pictures, verified_heap, write_report
-from experiments.report.companion import Replay, companion_of
 from experiments.report.kit.markdown import WALL_TIMES
+from experiments.report.study_companion import Replay, companion_of
 from experiments.report.writer import library_versions
 from experiments.runs.lasting import lasting_files
 from experiments.studyfile import Study
@@ -153,7 +153,7 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
     pictures = heap_pictures(campaign, desk.study, desk.store.load)
     solid = verified_heap(campaign, desk.store.load)
     with desk.publishing() as drafts:
-        write_report(campaign, desk.study, drafts, pictures, provenance, replay, solid)
+        write_report(campaign, desk.study, drafts, pictures, provenance, solid)
     return campaign
 
 

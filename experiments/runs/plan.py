@@ -23,7 +23,7 @@ from experiments.cases.workers.speed import Speed, measure_speed, store_speed, s
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.search import Search
 from experiments.io.errors import InputError, StudyError
-from experiments.report.companion import companion_of
+from experiments.report.study_companion import companion_of
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE, scenes_of
 

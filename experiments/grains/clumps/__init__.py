@@ -1,1 +1,1 @@
-"""Clumps for the shapes of grains."""
+"""Clumps that stand for a grain's shape."""

@@ -1,4 +1,4 @@
-"""Picture of a clump and its solid."""
+"""A picture of a clump beside the solid that it was made for."""
 
 from __future__ import annotations
 
@@ -14,23 +14,29 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 GRAIN = (0.78, 0.60, 0.38)
-"""Colour, red-green-blue."""
+"""Colour."""
 SUBDIVISIONS = 3
-"""Subdivisions of the icosahedron of a drawn sphere."""
+"""Of the icosahedron that a sphere is drawn as."""
 
 
 def require_picture(path: Path) -> None:
-    """Refuse a picture with an unknown ending, and one that exists; raise `InputError`."""
+    """Refuse a picture whose ending names no kind of picture; further errors as by `require_new_file`.
+
+    Raises
+    ------
+    InputError
+        When it does not.
+    """
     from matplotlib.figure import Figure
 
     known = Figure().canvas.get_supported_filetypes()
     if path.suffix.removeprefix(".").lower() not in known:
-        raise InputError(str(path), f"must end in one of {', '.join(known)}", path.suffix or "no ending")
+        raise InputError(str(path), f"must be a kind of picture ({', '.join(known)})", path.suffix or "none")
     require_new_file(path, "a picture")
 
 
 def draw_clump(path: Path, spheres: np.ndarray, solid: Trimesh | None) -> None:
-    """Draw spheres (n, 4) [m], and their solid from the same side where there is one."""
+    """Draw spheres (n, 4) [m], beside their solid where there is one, seen from the same side."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 4.5) if solid is not None else (4.5, 4.5), dpi=150)
@@ -56,6 +62,7 @@ def draw_clump(path: Path, spheres: np.ndarray, solid: Trimesh | None) -> None:
 
 
 def _mesh_of(spheres: np.ndarray) -> Trimesh:
+    """Surface of every sphere."""
     import trimesh
 
     unit = trimesh.creation.icosphere(subdivisions=SUBDIVISIONS)

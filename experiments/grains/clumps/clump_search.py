@@ -1,4 +1,4 @@
-"""The smallest clump with volume, inertia and surface within a tolerance."""
+"""A clump as good as asked for: the fewest spheres with volume, inertia and surface within a tolerance."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
-"""Tried numbers of spheres."""
+"""Numbers of spheres that are tried."""
 VOLUME_KEPT = 0.01
-"""Largest error of the volume with a protrusion that keeps it."""
+"""Error of the volume at which a protrusion is good enough."""
 MOST_FITS = 5
-"""Most fits to find the protrusion of one number of spheres."""
+"""Fits to find the protrusion of one number of spheres."""
 LARGEST_PROTRUSION = 0.2
-"""Largest protrusion over the solid's longest side."""
+"""Of the solid's longest side."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Quality of a clump of a number of spheres."""
+    """Quality of a clump of so many spheres."""
 
     spheres: int
     """Number of spheres."""
@@ -39,11 +39,11 @@ class Trial:
     surface_distance_mm: float
     """Distance of the surfaces, root mean square [mm]."""
     surface_error: float
-    """Distance of the surfaces over the diameter of the sphere of the solid's volume."""
+    """The same over the diameter of the sphere of the solid's volume."""
 
     @classmethod
     def of(cls, fit: ClumpFit, protrusion: float) -> Trial:
-        """Return the quality of a fit."""
+        """Judge a fit."""
         diameter = float(np.cbrt(6.0 * fit.solid_volume / np.pi))
         distance = fit.surface_distance
         return cls(
@@ -52,21 +52,19 @@ class Trial:
         )  # fmt: skip
 
     def within(self, tolerance: float) -> bool:
-        """Return True if volume, inertia and surface are within a tolerance."""
-        return self.worst <= tolerance
-
-    @property
-    def worst(self) -> float:
-        """Largest of the three errors."""
-        return max(abs(self.volume_error), self.inertia_error, self.surface_error)
+        """Tell that volume, inertia and surface are within a tolerance."""
+        return max(abs(self.volume_error), self.inertia_error, self.surface_error) <= tolerance
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the values for JSON."""
+        """Values for JSON."""
         return asdict(self)
 
 
 def fit_by_volume(solid: Trimesh, sphere_count: int) -> tuple[ClumpFit, float]:
-    """Fit a clump with the protrusion [m] that keeps the solid's volume, by secants; return both."""
+    """Fit a clump with the protrusion [m] that keeps the solid's volume, and return both.
+
+    The volume grows with the protrusion: secants lead to the root within `MOST_FITS` fits.
+    """
     low, limit = 0.0, LARGEST_PROTRUSION * float(solid.extents.max())
     best = fit_clump(solid, sphere_count, low), low
     error = best[0].volume_error
@@ -90,14 +88,15 @@ def fit_by_volume(solid: Trimesh, sphere_count: int) -> tuple[ClumpFit, float]:
 def fit_within(
     solid: Trimesh, tolerance: float, protrusion: float | None, watch: Callable[[Trial], None]
 ) -> tuple[ClumpFit, list[Trial]]:
-    """Fit more and more spheres until a clump is within a tolerance.
+    """Fit ever more spheres until a clump is within a tolerance.
 
     Parameters
     ----------
     solid
         Closed surface [m].
     tolerance
-        Largest error, see `Trial`.
+        Of the volume, of the moments of inertia, and of the surface over the diameter of the sphere of the
+        solid's volume.
     protrusion
         Distance by which a sphere may pass the surface [m]; None: the one that keeps the volume.
     watch
@@ -106,14 +105,14 @@ def fit_within(
     Returns
     -------
     fit
-        First clump within the tolerance.
+        The first clump within the tolerance.
     trials
-        All trials.
+        Everything that was tried.
 
     Raises
     ------
     InputError
-        When the largest of `COUNTS` is not enough.
+        When none of `COUNTS` is enough.
     """
     trials: list[Trial] = []
     for count in COUNTS:
@@ -125,9 +124,10 @@ def fit_within(
         watch(trials[-1])
         if trials[-1].within(tolerance):
             return fit, trials
-    best = min(trials, key=lambda each: each.worst)
-    problem = (
-        f"too small for {COUNTS[-1]} spheres: the best clump has {best.spheres} spheres, volume "
-        f"{best.volume_error:+.1%}, inertia {best.inertia_error:.1%}, surface {best.surface_error:.1%}"
+    best = min(trials, key=lambda each: max(abs(each.volume_error), each.inertia_error, each.surface_error))
+    rule = f"needs a tolerance that a clump of at most {COUNTS[-1]} spheres keeps, for example with --spheres"
+    received = (
+        f"{tolerance:.1%}; the best, {best.spheres} spheres: volume {best.volume_error:+.1%}, "
+        f"inertia {best.inertia_error:.1%}, surface {best.surface_error:.1%}"
     )
-    raise InputError("--tolerance", problem, f"{tolerance:.1%}", "Or use --spheres.")
+    raise InputError("--tolerance", rule, received)

@@ -11,6 +11,7 @@ from experiments.report.discovery.tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
 from experiments.report.kit.chart import Chart, add_bars, add_points, new_figure
 from experiments.report.kit.numbers import MISSING, capital, fixed
+from experiments.report.kit.texts import say
 from experiments.report.kit.theme import DIVERGING
 
 MAP_REACH = 6.0
@@ -70,11 +71,7 @@ def confounding_chart(confounding: Confounding, terms: Terms) -> Chart:
     figure = new_figure(legend=False)
     _add_map(figure, confounding.correlations, names, names, 1.0, _texts(confounding.correlations, 2))
     figure.update_xaxes(tickangle=-40)
-    caption = (
-        "Correlation of what two mechanisms leave after calibration: near 1 or −1 these data cannot tell them"
-        " apart, near 0 they cannot be taken for one another."
-    )
-    return Chart("confounding-chart", caption, figure, height="tall", columns=len(names))
+    return Chart("confounding-chart", say("note.confounding"), figure, "tall", columns=len(names))
 
 
 def gap_chart(found: Discovery) -> Chart:

@@ -10,6 +10,7 @@ import numpy as np
 from doe.discrepancy import CalibrationUse, Discovery, Fit, Question, Slip, Verdict
 from experiments.report.discovery.terms import Terms, spaced
 from experiments.report.kit.numbers import enumeration, trimmed
+from experiments.report.kit.texts import say
 from experiments.studyfile.observables import Instrument
 
 CLEAR = 0.05
@@ -55,7 +56,7 @@ def conventions(found: Discovery, terms: Terms) -> list[str]:
         instrument = terms.observables[one.observable].instrument
         if instrument is not None:
             told.setdefault(_CONVENTIONS[instrument], []).append(spaced(one.observable))
-    return [f"For {enumeration(names)}: {text} would look the same." for text, names in told.items()]
+    return [say("misses.same", names=enumeration(names), text=text) for text, names in told.items()]
 
 
 def leaning(fit: Fit | None, terms: Terms) -> str:
@@ -66,7 +67,7 @@ def leaning(fit: Fit | None, terms: Terms) -> str:
         return ""
     told = (f"{what} ({trimmed(by, 2)} standard deviations)" for what, by in leans.items())
     which = "that instrument" if len(leans) == 1 else "those instruments"
-    return f"The model leans on what was allowed for the calibration of {enumeration(told)}: check {which}."
+    return say("misses.leaning", what=enumeration(told), which=which)
 
 
 def _leaned_on(use: CalibrationUse, terms: Terms) -> tuple[str, float]:
@@ -84,11 +85,7 @@ def measure_again(found: Discovery) -> str:
     if not missed:
         return ""
     where = f"under “{missed[0].condition}”" if missed[0].condition else "under two conditions"
-    return (
-        f"Measure {spaced(missed[0].observable)} of a few more heaps {where} with another instrument, or by"
-        " another person: if it is off as much again, an effect is there that the library lacks, and if not,"
-        " the first measurement was off."
-    )
+    return say("misses.again", observable=spaced(missed[0].observable), where=where)
 
 
 def slip_sentences(found: Discovery) -> Iterator[str]:
@@ -96,20 +93,21 @@ def slip_sentences(found: Discovery) -> Iterator[str]:
     for slip in found.slips:
         if slip.replicate is not None:
             lies = "It lies" if len(slip.observables) == 1 else "On average its values lie"
-            yield f"{_slip(slip)} {lies} {trimmed(slip.q_with**0.5, 2)} standard deviations from the others."
+            deviations = trimmed(slip.q_with**0.5, 2)
+            yield say("misses.slip_of_heap", slip=_slip(slip), lies=lies, deviations=deviations)
         else:
             after = "once they are exchanged back" if slip.exchanged else "without these values"
-            least = f"The least Q of the base, alone or with one effect, is {trimmed(slip.q_with, 3)}"
-            yield f"{_slip(slip)} {least}, and {trimmed(slip.q_without, 3)} {after}."
+            q, q_without = trimmed(slip.q_with, 3), trimmed(slip.q_without, 3)
+            yield say("misses.slip_of_values", slip=_slip(slip), q=q, q_without=q_without, after=after)
 
 
 def _slip(slip: Slip) -> str:
     if slip.exchanged:
-        return f"A likely slip: the conditions {enumeration(slip.conditions)} look exchanged."
+        return say("misses.exchanged", names=enumeration(slip.conditions))
     names, many = enumeration(map(spaced, slip.observables)), len(slip.observables) > 1
     heap = "" if slip.replicate is None else f"heap {slip.replicate} under {slip.conditions[0]}"
     if not heap and len(slip.conditions) == 1:
-        return f"A likely slip: what was measured under {slip.conditions[0]} fits nothing else."
+        return say("misses.condition", name=slip.conditions[0])
     how = f"{'are' if many else 'is'} far from all that the rest allows"
     if heap:
         names, how = (heap, "is none of the others") if many else (f"{names} of {heap}", how)
@@ -117,8 +115,7 @@ def _slip(slip: Slip) -> str:
     if slip.factor is None:
         return f"A likely slip: {names} {how}."
     look = "look" if many else "looks"
-    factor = trimmed(slip.factor, 3)
-    return f"A likely slip: {names} {look} as if multiplied by {factor}: a unit, a digit or a sign?"
+    return say("misses.factor", names=names, look=look, factor=trimmed(slip.factor, 3))
 
 
 @dataclass(frozen=True)
@@ -141,9 +138,14 @@ class _Miss:
         more, less = ("late", "early") if late else ("too large", "too small")
         size = f"{trimmed(abs(factor * self.away), 2)} {unit}".strip()
         where = f"under {self.condition}" if self.condition else "in all conditions"
-        return (
-            f"{spaced(self.observable)} is {size} {more if self.away > 0.0 else less} {where}"
-            f" ({trimmed(self.deviations, 2)} {self.error})."
+        return say(
+            "misses.off",
+            name=spaced(self.observable),
+            size=size,
+            direction=more if self.away > 0.0 else less,
+            where=where,
+            deviations=trimmed(self.deviations, 2),
+            error=self.error,
         )
 
 
@@ -200,8 +202,7 @@ def heading_phrase(fit: Fit) -> str:
     towards = {0.0: "to the right of the pictures (+x)", 180.0: "to the left of the pictures (-x)"}
     # pictures from one side do not tell if it is towards the camera or away from it
     off = min(fit.heading, 360.0 - fit.heading)
-    other = f"some {off:.0f} degrees off the right of the pictures, towards the camera or away from it"
-    return f", down {towards.get(fit.heading, other)}"
+    return f", down {towards.get(fit.heading, say('misses.heading', off=off))}"
 
 
 def slip_decides(found: Discovery) -> bool:
@@ -231,4 +232,4 @@ def with_and_without(found: Discovery, terms: Terms) -> str:
     told = [
         words.get(one.verdict, f"{one.verdict.value}: {terms.titles(one.named)}") for one in (rest, found)
     ]
-    return f"Without the values of the likely slip: {told[0]}. With them: {told[1]}."
+    return say("misses.both", without=told[0], with_them=told[1])

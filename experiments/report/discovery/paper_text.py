@@ -12,6 +12,7 @@ from experiments.report.discovery.tables import parameters_table
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import verdict_line
 from experiments.report.kit.numbers import prose
+from experiments.report.kit.texts import say
 from experiments.report.paper_text import Paste, pastes_of, simulated_sentences, software
 from experiments.studyfile import Study
 
@@ -31,15 +32,19 @@ def search_paragraph(found: Discovery, study: Study, terms: Terms, provenance: M
     means = int(np.isfinite(data.means[~np.array(data.held_out)]).sum())
     effects = {name for candidate in found.candidates for name in candidate.mechanisms}
     sentences = [
-        f"Effects that the model lacks were looked for with {software(provenance)}.",
+        say("methods.looked_for", software=software(provenance)),
         *simulated_sentences(study),
-        f"The model was fitted to {means} means of {len(data.observables)} observables under "
-        f"{len(data.conditions) - held_out} conditions; {held_out or 'no'} further "
-        f"condition{' was' if held_out == 1 else 's were'} held out.",
-        "The misfit Q is the sum of the squared residuals, each over its standard error; its limits come "
-        "from a parametric bootstrap.",
-        f"{len(effects)} effects were fitted in turn together with the factors." if effects else "",
-        f"{found.effort.bank_cases + found.effort.fresh_cases} cases were simulated.",
+        say(
+            "methods.fitted",
+            means=means,
+            observables=len(data.observables),
+            conditions=len(data.conditions) - held_out,
+            held_out=held_out or "no",
+            were=" was" if held_out == 1 else "s were",
+        ),
+        say("methods.q"),
+        say("methods.effects", count=len(effects)) if effects else "",
+        say("methods.cases", count=found.effort.bank_cases + found.effort.fresh_cases),
         prose(verdict_line(found, terms)),
     ]
     return " ".join(sentence for sentence in sentences if sentence)

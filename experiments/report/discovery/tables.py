@@ -12,6 +12,7 @@ from doe.discrepancy import BeforeAfter, Candidate, Discovery, Drift, Fit, Inter
 from experiments.report.discovery.terms import GAP, Terms, condition_name, percent, spaced
 from experiments.report.kit.numbers import MISSING, estimate, trimmed
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
+from experiments.report.kit.texts import say
 
 T = TypeVar("T")
 Entries = dict[Column, Callable[[T], object]]
@@ -105,20 +106,9 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
         Column("gain", "held-out gain"): lambda one: _interval(one.held_out_gain, 1),
         Column("judged", "judgement"): lambda one: "admitted" if one.admitted else one.objection,
     }
-    share = (
-        "" if excess else " There is no share of an excess: Q of the base is within its degrees of freedom."
-    )
-    note = (
-        "Q: squared residuals in standard deviations, after factors and size were fitted together to the"
-        " training conditions; held-out conditions count by how far their forecast misses them."
-        " p: of Q and of what is off alike in all conditions, among data sets that the model itself makes;"
-        " fit_level is the least. Size / se: over the standard error that it would have if there were none."
-        " Held-out gain: rise of the log score of the conditions that took no part in"
-        f" any fit, with its 90 % interval.{share} What was too far behind was judged by the emulator, the"
-        " others by fresh runs."
-    )
+    note = say("note.candidates", share="" if excess else say("note.no_excess"))
     if left_out := len(found.candidates) - len(shown):
-        note += f" {left_out} pairs further behind stand in tables/candidates.csv."
+        note += say("note.pairs_left", count=left_out)
     named = set(found.named)
     marks = ["chosen" if one.admitted and set(one.mechanisms) <= named else "" for one in shown]
     pairs = any(len(one.mechanisms) > 1 for one in shown)
@@ -137,12 +127,8 @@ def power_table(found: Discovery, terms: Terms) -> Table:
         Column("visible", "left after calibration", "percent", "%"): lambda one: 100.0 * one.visible_share,
         Column("resolvable", "resolvable"): lambda one: "yes" if one.resolvable else "no",
     }
-    note = (
-        "Smallest size named: found and told from every other in four of five data sets like this one, at a"
-        " false-alarm rate of 2.5 %, as the emulator has it; resolvable is what has such a size in its range."
-        " Left after calibration: the share of its signature that other values of the factors cannot imitate."
-    )
-    return _laid_out("power", found.power, entries, "The smallest size of each mechanism that shows.", note)
+    caption = "The smallest size of each mechanism that shows."
+    return _laid_out("power", found.power, entries, caption, say("note.power"))
 
 
 def before_after_table(found: Discovery) -> Table:
@@ -157,11 +143,8 @@ def before_after_table(found: Discovery) -> Table:
         Column("removed", "excess removed [%]"): lambda one: _interval(_times(one.removed, 100.0), 0),
         Column("runs", "fresh runs a model and condition", "count"): lambda one: one.runs,
     }
-    note = (
-        "Values with 90 % bootstrap intervals. Noise alone gives a Q near the degrees of freedom. What the"
-        " noise of the means adds to a Q is taken off its interval, whose lower end may so fall below zero."
-    )
-    return _laid_out("before-after", found.before_after, entries, "The gap before and after.", note)
+    caption = "The gap before and after."
+    return _laid_out("before-after", found.before_after, entries, caption, say("note.before_after"))
 
 
 def parameters_table(found: Discovery, terms: Terms) -> Table:
@@ -203,13 +186,8 @@ def calibration_table(found: Discovery, terms: Terms) -> Table | None:
     for name, title in {"base": "base", "chosen": "with the mechanism", "closest": "closest model"}.items():
         if name in models:
             shown += [Column(name, f"offset used, {title}"), Column(f"{name}_sd", "of both, in sd", "ratio")]
-    note = (
-        "Standard deviations of what an instrument may be off by in all conditions alike, as the file of"
-        " measured heaps states them or as is usual for the instrument; and the likeliest offset, measured"
-        " less true, given all residuals of a model. Lengths, times or weights of one instrument are off by"
-        " one scale. Above 2 a model leans on an allowance: check that instrument."
-    )
-    return make_table("calibration", pd.DataFrame(rows), shown, "What instruments may be off by.", note)
+    caption = "What instruments may be off by."
+    return make_table("calibration", pd.DataFrame(rows), shown, caption, say("note.calibration"))
 
 
 def drifts_table(found: Discovery, terms: Terms) -> Table:
@@ -221,14 +199,10 @@ def drifts_table(found: Discovery, terms: Terms) -> Table:
         for drift in found.drifts
     ]
     names = dict.fromkeys(name for drift in found.drifts for name in drift.conditions)
-    note = (
-        "A parameter of a true model is the same wherever it is fitted (Box and Hunter 1962). Small p: it had"
-        " to change to follow the condition. This describes; the verdict does not rest on it."
-    )
     marks = ["strong" if drift.p_value < 0.05 else "" for drift in found.drifts]
     caption = "Factors of the base, fitted condition by condition."
     shown: Layout = ["factor", Column("label", "what it is"), *names, "p"]
-    return make_table("drifts", pd.DataFrame(rows), shown, caption, note, marks)
+    return make_table("drifts", pd.DataFrame(rows), shown, caption, say("note.drifts"), marks)
 
 
 def data_table(found: Discovery, terms: Terms) -> Table:

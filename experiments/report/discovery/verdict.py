@@ -30,6 +30,7 @@ from experiments.report.discovery.disagreement import (
 )
 from experiments.report.discovery.terms import Terms, percent, spaced
 from experiments.report.kit.numbers import capital, enumeration, fixed, p_clause, trimmed
+from experiments.report.kit.texts import say
 
 SETTLED = (Verdict.NONE, Verdict.NAMED)
 """Verdicts that leave no question open."""
@@ -67,7 +68,7 @@ def verdict_sentence(found: Discovery, terms: Terms) -> str:
     if found.without_slips is not None and slip_decides(found):
         rest = found.without_slips
         told = _found(rest, terms)
-        return " ".join([*slips, f"This is found without them, and all that follows with them: {told}"])
+        return " ".join([*slips, say("verdict.slips_first", told=told)])
     return " ".join([_found(found, terms), *slips])
 
 
@@ -104,67 +105,50 @@ def tied(found: Discovery) -> list[Candidate]:
 def changes(found: Discovery, terms: Terms, settings: Settings) -> list[str]:
     """Say what would change the verdict, a sentence each."""
     parts = _CHANGES[found.verdict]
-    return [s for part in parts for s in ([part] if isinstance(part, str) else part(found, terms, settings))]
+    return [
+        sentence
+        for part in parts
+        for sentence in ([say(part)] if isinstance(part, str) else part(found, terms, settings))
+    ]
 
 
 def next_step(found: Discovery, terms: Terms) -> str:
     """Describe the next experiment; empty where none is proposed."""
     step, unknown = found.next_experiment, found.verdict is Verdict.UNKNOWN
     if slip_decides(found) or (found.slips and unknown and step is None):
-        return (
-            "Look at the data first: put these values right, or leave them out, and search again. No more"
-            " heaps need be measured before."
-        )
+        return say("verdict.data_first")
     if step is None:
         return measure_again(found) if unknown else ""
     pair = " from ".join(
         "the base" if name == "base" else f"the model with {terms.titles(name.split(BOTH))}"
         for name in step.separates
     )
-    expected = f"after both are fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart"
+    expected = say("verdict.expected", q=trimmed(step.expected_q, 3))
+    shared = {"pair": pair, "tests": step.replicates, "expected": expected}
     if not step.settles:
-        return (
-            f"No condition of the study would tell {pair}, not with {step.replicates} more tests either:"
-            f" {expected}, where {trimmed(step.wanted_q, 3)} would tell them apart. It takes another"
-            " measurement than these."
-        )
+        return say("verdict.cannot_settle", **shared, wanted=trimmed(step.wanted_q, 3))
     how = ", ".join(f"{place} = {value}" for place, value in step.changes)
     setting = f"“{step.condition}”" + (f" ({how})" if how else "")
-    return (
-        f"Repeat the test {step.replicates} times under the condition {setting}. It tells {pair} best:"
-        f" {expected} there, most in the {spaced(step.observable)}."
-    )
+    return say("verdict.repeat", **shared, setting=setting, observable=spaced(step.observable))
 
 
 def _none(found: Discovery, terms: Terms) -> str:
     if found.base is None or found.gap is None:
         return reason_sentence(found, terms)
-    return (
-        "Fitted as well as it can be, the model agrees with the data within their noise:"
-        f" {_q_and_p(found.base)}.{_drifting(found, terms)}{_single_means(found, terms)}"
-    )
+    drifting, means = _drifting(found, terms), _single_means(found, terms)
+    return say("verdict.none", misfit=_q_and_p(found.base), drifting=drifting, means=means)
 
 
 def _single_means(found: Discovery, terms: Terms) -> str:
     """Say why a marked mean is no contradiction to a model that lacks nothing."""
     told = standing_out(found, terms)
-    if not told:
-        return ""
-    return (
-        f" By itself {' And '.join(told)} All means together do not bear an effect out: chance marks a mean"
-        " somewhere in one of twenty data sets. Look at how it was measured."
-    )
+    return say("verdict.single_means", told=" And ".join(told)) if told else ""
 
 
 def _drifting(found: Discovery, terms: Terms) -> str:
     """Say why a drift of a factor is no contradiction to a model that lacks nothing."""
     drifting = [terms.factors[drift.factor].label for drift in found.drifts if drift.p_value < DRIFTS]
-    if not drifting:
-        return ""
-    return (
-        f" Fitted to one condition at a time, {enumeration(drifting)} would differ between conditions; one"
-        " value fits them all within the noise, so that this is no sign of an effect that is missing."
-    )
+    return say("verdict.drifting", names=enumeration(drifting)) if drifting else ""
 
 
 def _added(found: Discovery, terms: Terms) -> str:
@@ -186,12 +170,11 @@ def _added(found: Discovery, terms: Terms) -> str:
 
 
 def _tie(found: Discovery, terms: Terms) -> str:
-    each = "; ".join(
-        f"{terms.titles(one.mechanisms)} at {terms.sizes(one.mechanisms, one.sizes)} leaves Q ="
-        f" {trimmed(one.q, 3)}"
-        for one in tied(found)
-    )
-    return f"The model disagrees with the data, and these explain it alike: {each}."
+    each = []
+    for one in tied(found):
+        titles, sizes = terms.titles(one.mechanisms), terms.sizes(one.mechanisms, one.sizes)
+        each.append(say("verdict.tie_one", titles=titles, sizes=sizes, q=trimmed(one.q, 3)))
+    return say("verdict.tie", each="; ".join(each))
 
 
 def _unknown(found: Discovery, terms: Terms) -> str:
@@ -201,7 +184,7 @@ def _unknown(found: Discovery, terms: Terms) -> str:
     how = f", not by Q alone but in that {_beyond(found.base.clearest, terms)}" if within else ""
     text = f"The model disagrees with the data ({_q_and_p(found.base)}){how}"
     if not found.candidates:
-        return f"{text}, and the library has nothing to explain it with."
+        return say("verdict.nothing_explains", text=text)
     best = found.candidates[0]
     many = len(best.mechanisms) > 1
     does = f"{'they leave' if many else 'it leaves'} Q = {trimmed(best.q, 3)}"
@@ -220,11 +203,8 @@ def _unknown(found: Discovery, terms: Terms) -> str:
 
 def _q_and_p(base: Fit) -> str:
     """Say how much a base misses, and how often chance does as much in the clearest of its tests."""
-    freedom = fixed(base.degrees_of_freedom, 0)
-    return (
-        f"Q = {trimmed(base.q, 3)} at {freedom} degrees of freedom; for the clearest of Q and two other"
-        f" tests, p {p_clause(base.p_value)}"
-    )
+    q, freedom = trimmed(base.q, 3), fixed(base.degrees_of_freedom, 0)
+    return say("verdict.misfit", q=q, freedom=freedom, p=p_clause(base.p_value))
 
 
 def _beyond(answer: Answer, terms: Terms) -> str:
@@ -232,7 +212,7 @@ def _beyond(answer: Answer, terms: Terms) -> str:
     statistic = {
         Question.SIZE: "Q is",
         Question.FALL: f"{terms.title(answer.mechanism)} would lower Q by",
-        Question.SCORES: "it lies along the effects of the library, whose squared scores sum to",
+        Question.SCORES: say("verdict.scores"),
     }[answer.question]
     limit = "limit of such a fall" if answer.question is Question.FALL else "limit"
     return f"{statistic} {trimmed(answer.value, 3)} ({limit} {trimmed(answer.limit, 3)})"
@@ -242,13 +222,10 @@ def _smaller_effects(found: Discovery, terms: Terms, settings: Settings) -> Iter
     visible = [power for power in found.power if power.resolvable]
     hidden = [power for power in found.power if not power.resolvable]
     if visible:
-        yield (
-            "Effects below the smallest sizes listed above could have gone unseen or unnamed, and one in"
-            " five of just these sizes would have."
-        )
+        yield say("verdict.small_effects")
     if hidden:
         act = "it acts" if len(hidden) == 1 else "they act"
-        yield f"{_cannot_be_seen(hidden, terms)}: whether {act} here is left open."
+        yield say("verdict.left_open", hidden=_cannot_be_seen(hidden, terms), act=act)
 
 
 def _margins(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
@@ -258,21 +235,15 @@ def _margins(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str
         return
     weakest = min(chosen.size_over_se)
     least = settings.least_ratio if len(model) == 1 else settings.pair_ratio
-    size = f"({fixed(weakest, 1)} standard errors from its null)"
-    text = f"Data that took the size {size} below {least:g} of them"
-    if chosen.held_out_gain:
-        gain = _gain(chosen.held_out_gain)
-        text += f", or the held-out gain (now {gain}) to nothing"
-    yield text + ", would withdraw the name."
+    gained = chosen.held_out_gain
+    gain = say("verdict.margins_gain", gain=_gain(gained)) if gained else ""
+    yield say("verdict.margins", ratio=fixed(weakest, 1), least=least, gain=gain)
 
 
 def _room(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     if found.chosen is not None:
-        yield (
-            f"Of the data sets that the model with it makes, {percent(found.chosen.p_value)} disagree with"
-            f" it as much; were it less than {percent(settings.fit_level)}, something else would be missing"
-            " too, and nothing would be named."
-        )
+        share, least = percent(found.chosen.p_value), percent(settings.fit_level)
+        yield say("verdict.room", share=share, least=least)
 
 
 def _rivals(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
@@ -281,13 +252,14 @@ def _rivals(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]
     for rival in refused[:SHOWN_RIVALS]:
         objection = _one_name(rival.objection, terms).rstrip(".")
         were = "were" if len(rival.mechanisms) > 1 else "was"
-        yield f"{capital(terms.titles(rival.mechanisms))} {were} refused: {objection}."
+        titles = capital(terms.titles(rival.mechanisms))
+        yield say("verdict.refused", titles=titles, were=were, objection=objection)
 
 
 def _unresolved(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     hidden = [p for p in found.power if not p.resolvable and p.mechanism not in found.named]
     if hidden:
-        yield f"{_cannot_be_seen(hidden, terms)}, so they can neither name nor exclude it."
+        yield say("verdict.unresolved", hidden=_cannot_be_seen(hidden, terms))
 
 
 def _settle_by_experiment(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
@@ -296,22 +268,19 @@ def _settle_by_experiment(found: Discovery, terms: Terms, settings: Settings) ->
         return
     if step.settles:
         tests = f"{step.replicates} more tests under the condition “{step.condition}”"
-        yield f"{capital(tests)} would settle it (see the next experiment)."
+        yield say("verdict.would_settle", tests=capital(tests))
         return
-    yield f"No condition of the study would settle it, not with {step.replicates} more tests either."
+    yield say("verdict.no_condition", tests=step.replicates)
     both = [name for model in step.separates for name in model.split(BOTH)]
     for name in found.named or both:
         if name in terms.mechanisms:
-            yield f"To see whether it is {terms.title(name)}: {terms.mechanisms[name].confirm}"
+            yield say("verdict.to_see", title=terms.title(name), confirm=terms.mechanisms[name].confirm)
 
 
 def _more_data(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     measured = int(np.isfinite(found.data.means[~np.array(found.data.held_out)]).sum())
-    yield (
-        f"The training conditions give {measured} mean value{'' if measured == 1 else 's'} for"
-        f" {len(found.factors)} fitted parameters. More observables of the same tests (a photograph of a heap"
-        " gives six), or the same test under other conditions, would change that; more replicates would not."
-    )
+    s, factors = "" if measured == 1 else "s", len(found.factors)
+    yield say("verdict.more_data", means=measured, s=s, factors=factors)
 
 
 _SENTENCES: dict[Verdict, Callable[[Discovery, Terms], str]] = {
@@ -322,19 +291,11 @@ _SENTENCES: dict[Verdict, Callable[[Discovery, Terms], str]] = {
     Verdict.NOT_IDENTIFIABLE: reason_sentence,
 }
 
-_OUTSIDE = (
-    "An effect outside the library that moves the same observables in the same proportions would be taken for"
-    " this one: its further experiment, below, is what tells them apart."
-)
-_WIDEN = (
-    "A mechanism that is added to the library (one file) and explains the map of residuals would be named"
-    " from the same data."
-)
 _CHANGES: dict[Verdict, tuple[str | Callable[[Discovery, Terms, Settings], Iterator[str]], ...]] = {
     Verdict.NONE: (_smaller_effects,),
-    Verdict.NAMED: (_margins, _room, _rivals, _unresolved, _OUTSIDE),
+    Verdict.NAMED: (_margins, _room, _rivals, _unresolved, "verdict.outside"),
     Verdict.TIE: (_settle_by_experiment, _rivals, _unresolved),
-    Verdict.UNKNOWN: (_settle_by_experiment, _rivals, _WIDEN, _unresolved),
+    Verdict.UNKNOWN: (_settle_by_experiment, _rivals, "verdict.widen", _unresolved),
     Verdict.NOT_IDENTIFIABLE: (_more_data,),
 }
 
@@ -344,7 +305,7 @@ def _set(found: Discovery, held_out: bool) -> BeforeAfter | None:
 
 
 def _cannot_be_seen(hidden: list[Power], terms: Terms) -> str:
-    return f"Within their ranges these data cannot resolve {terms.titles(p.mechanism for p in hidden)}"
+    return say("verdict.hidden", names=terms.titles(power.mechanism for power in hidden))
 
 
 def _share(share: Interval) -> str:

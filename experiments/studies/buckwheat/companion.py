@@ -1,88 +1,118 @@
-"""Companion of the buckwheat study: the paper's numbers, its runs simulated again, its misprints."""
+"""Companion of the buckwheat study: the paper's numbers next to a campaign's, and its misprints."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
-from dem_warp import CaseResult
-from doe import Sample
-from experiments.calibrate.results import Campaign
-from experiments.report.companion import Companion
+from doe import ScreenResult, compare_means
+from experiments.calibrate.results import Campaign, SurfaceResult
 from experiments.report.kit.html import Chapter
-from experiments.report.kit.table import Table, make_table
-from experiments.report.published import Published
+from experiments.report.kit.numbers import enumeration, fixed
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
+from experiments.report.stage_tables import ERROR_PERCENT, differences_table, quality_of
+from experiments.report.study_companion import Companion
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.records.paper_page import draw_heaps, write_record
-from experiments.studies.buckwheat.replay.replay import Replay
-from experiments.studies.buckwheat.replay.replay_tables import replay_chart, replay_tables
-from experiments.studies.buckwheat.replay.runs import STAGES, planned_cases
-from experiments.studyfile import Study
 
-REPLAY = (
-    "The runs of the paper's own designs, simulated with the paper's settings, beside the angles that it "
-    "prints: no decision of this campaign rests on them."
+TEXT = (
+    "The paper kept {kept} and chose {point}. Its numbers are recomputed here from the runs that it prints. "
+    "Most printed results follow from them; the misprints below do not, or contradict the rest of the text."
 )
-MISPRINTS = (
-    "What this page calls the paper's is recomputed from the runs that the paper prints. Most printed "
-    "results follow from them; these do not, or contradict the rest of the text."
-)
+MODELS = {"full": "quadratic", "reduced": "reduced"}
+"""Names of the models in `paper.surface`."""
 
-
-class PaperReplay(Replay):
-    """The paper's runs simulated again, with a chapter and a page."""
-
-    def chapters(self, campaign: Campaign) -> list[Chapter]:
-        """Chapter on every run beside its published angle, and on both analyses."""
-        effects = campaign.screening.leading.screen.table if campaign.screening else None
-        tables, title = replay_tables(self, effects), "The paper's runs, simulated again"
-        return [Chapter("replay", title, tables, [replay_chart(self)], REPLAY)]
-
-    def write_record(
-        self,
-        folder: Path,
-        study: Study,
-        load: Callable[[str], CaseResult],
-        provenance: Mapping[str, Any],
-        campaign: Campaign | None,
-    ) -> Path:
-        """Write the page on the runs, its tables and its picture; see `report.companion.Replay`."""
-        draw_heaps(folder, study, self, load)
-        return write_record(folder, self.cases, provenance, campaign)
+TEST = ("F", "p")
+"""Columns of a test."""
 
 
 class BuckwheatCompanion(Companion):
     """Numbers that the paper printed, and what follows from them."""
 
-    def published(self) -> Published:
-        """The paper's own results, recomputed from its printed runs."""
-        climb = paper.published("steepest_climb").rename_axis("step")
-        reduced = paper.surface("reduced")
-        settings = paper.published("settings")["value"]
-        return Published(
-            screening=paper.screening().table,
-            climb=climb.rename(columns={"repose_angle_deg": "angle", "relative_error_pct": "error_percent"}),
-            surfaces={"full": paper.surface("quadratic"), "reduced": reduced},
-            optimum={name: float(settings[name]) for name in reduced.design.names},
-            heaps=Sample.of(paper.verification()),
-            measured=paper.measured(),
-        )
-
-    def planned_runs(self, replicates: int) -> dict[str, pd.DataFrame]:
-        """Every run of Tables 3, 5 and 6 and of the verification, a batch a stage."""
-        return {f"paper, {stage}": planned_cases(replicates, [stage]) for stage in STAGES}
-
-    def replay(self, cases: pd.DataFrame) -> PaperReplay:
-        """Analyse simulated cases of `planned_runs`."""
-        return PaperReplay(cases)
-
     def campaign_chapters(self, campaign: Campaign) -> Sequence[Chapter]:
-        """Chapter on what the paper's own numbers contradict."""
-        return [Chapter("paper", "The paper's numbers", {"misprints": misprints_table()}, text=MISPRINTS)]
+        """Return the chapter on the paper's numbers, next to those of every stage that was reached."""
+        reduced, tables = paper.surface("reduced"), {}
+        settings = paper.published("settings")["value"]
+        if campaign.screening is not None:
+            tables["effects"] = _effects_table(campaign.screening.leading.screen)
+        if campaign.climb is not None:
+            tables["climb"] = _climb_table()
+        if campaign.surface is not None:
+            tables |= _surface_tables(campaign.surface)
+        if campaign.verification is not None:
+            test = compare_means(paper.verification(), paper.measured(), campaign.verification.leading.margin)
+            tables["tests"] = differences_table({"the paper": test}, {"the paper": "deg"}, "paper-tests")
+        tables["misprints"] = misprints_table()
+        names = reduced.design.names
+        point = enumeration(f"{name} = {fixed(float(settings[name]), 3)}" for name in names)
+        return [
+            Chapter(
+                "paper", "The paper's numbers", tables, text=TEXT.format(kept=enumeration(names), point=point)
+            )
+        ]
+
+
+def _effects_table(screen: ScreenResult) -> Table:
+    """Lay out the tests of the effects, the campaign's strongest first."""
+    frame = _with_paper(screen.table.sort_values("rank"), paper.screening().table)
+    return make_table("paper-effects", frame, ["factor", *_tests()], "Tests of the effects on the angle.")
+
+
+def _climb_table() -> Table:
+    path = paper.published("steepest_climb").rename_axis("step")
+    path = path.rename(columns={paper.RESPONSE: "angle", "relative_error_pct": "error_percent"})
+    factors = [Column(name, name, "value") for name in path.columns.drop(["angle", "error_percent"])]
+    shown: Layout = ["step", *factors, *columns("angle", "°", angle="angle"), ERROR_PERCENT]
+    return make_table("paper-climb", path, shown, "The paper's climb.")
+
+
+def _surface_tables(result: SurfaceResult) -> dict[str, Table]:
+    """Lay out tests, quality and coefficients of both models; tests where the factors are the paper's."""
+    own = {"full": result.leading.full, "reduced": result.leading.reduced}
+    papers = {name: paper.surface(model) for name, model in MODELS.items()}
+    tables = {}
+    if set(result.design.names) == set(papers["full"].design.names):
+        for name, surface in own.items():
+            frame = _with_paper(surface.anova, _renamed(papers[name].anova, result.design.names))
+            caption = f"Analysis of variance of the {name} model."
+            tables[name] = make_table(
+                f"paper-anova-{name}", frame.rename_axis("source"), ["source", *_tests()], caption
+            )
+    quality = quality_of(own).join(quality_of(papers).drop(columns="measure").add_prefix("paper_"))
+    heads = {
+        "full": "full",
+        "reduced": "reduced",
+        "paper_full": "paper, full",
+        "paper_reduced": "paper, reduced",
+    }
+    shown: Layout = ["measure", *columns("share", **heads)]
+    tables["quality"] = make_table("paper-quality", quality, shown, "Quality of the fits.")
+    coefficients = pd.DataFrame({name: surface.coefficients for name, surface in papers.items()})
+    caption = "Coefficients of the paper's models, natural units."
+    layout: Layout = ["term", *columns("sum", "°", full="full", reduced="reduced")]
+    tables["coefficients"] = make_table(
+        "paper-coefficients", coefficients.rename_axis("term"), layout, caption
+    )
+    return tables
+
+
+def _with_paper(own: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
+    return own.join(published[list(TEST)].add_prefix("paper_"))
+
+
+def _tests() -> list[Column]:
+    return [
+        Column("F", "F", "ratio"),
+        Column("p", "p", "p"),
+        Column("paper_F", "paper, F", "ratio"),
+        Column("paper_p", "paper, p", "p"),
+    ]
+
+
+def _renamed(anova: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
+    """Write interactions in the order of the campaign's factors."""
+    return anova.rename(index={f"{b}:{a}": f"{a}:{b}" for i, a in enumerate(names) for b in names[i + 1 :]})
 
 
 def misprints_table() -> Table:

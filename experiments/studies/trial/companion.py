@@ -9,11 +9,11 @@ from pathlib import Path
 import pandas as pd
 
 from doe.discrepancy import Discovery
-from experiments.report.companion import Companion
 from experiments.report.discovery.terms import Terms
 from experiments.report.kit.html import Chapter
 from experiments.report.kit.numbers import MISSING, estimate, trimmed
 from experiments.report.kit.table import Layout, Table, columns, make_table
+from experiments.report.study_companion import Companion
 
 NORMAL_90 = 1.645
 """Standard errors to either side that hold a normal value with 90 %."""

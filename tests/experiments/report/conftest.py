@@ -3,58 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from html.parser import HTMLParser
 
 import numpy as np
-import pandas as pd
 import pytest
+from analytic_heaps import Runner, analytic_heaps, study_with
 from discoveries import made_discovery, made_terms
+from plotly.offline import get_plotlyjs
 
 from doe.discrepancy import Discovery, Verdict
 from experiments.calibrate import Campaign, calibrate
 from experiments.report import render_page
 from experiments.report.discovery import Terms
+from experiments.report.kit import html
 from experiments.studyfile import Study, load_study
-from experiments.studyfile.campaign import CampaignSettings
-
-Angle = Callable[[Mapping[str, float]], float]
-Runner = Callable[[pd.DataFrame], pd.DataFrame]
-
-NOISE = 0.35
-"""Standard deviation of one analytic heap [deg]."""
 
 VOID = {"meta", "link", "img", "br"}
 """Elements that have no end tag."""
-
-
-def friction(row: Mapping[str, float]) -> float:
-    """Both static frictions raise the angle, nothing else does."""
-    e, f = (row["E"] - 0.48) / 0.06, (row["F"] - 0.45) / 0.10
-    return 30.2 + 3.0 * e + 2.0 * f + 0.7 * e * f - 0.35 * f * f
-
-
-def analytic_heaps(
-    angle: Callable[[Mapping[str, float]], float] = friction,
-    fails: Callable[[Mapping[str, float]], bool] = lambda row: False,
-) -> Callable[[pd.DataFrame], pd.DataFrame]:
-    """Make a runner: the angle is a function of the settings plus noise from the case's seed."""
-
-    def run(table: pd.DataFrame) -> pd.DataFrame:
-        rows = table.to_dict("records")
-        failed = np.array([fails(row) for row in rows])
-        angles = [angle(row) + NOISE * np.random.default_rng(row["seed"]).standard_normal() for row in rows]
-        return table.assign(
-            status=np.where(failed, "diverged", "finished"),
-            reason=np.where(failed, "a grain left <the domain> & fell", ""),
-            angle=np.where(failed, np.nan, angles),
-            angle_se=0.2,
-            grain_count=400.0,
-            fill_height=0.028,
-            case_key=[f"key-{row['seed']}" for row in rows],
-        )
-
-    return run
 
 
 class Page(HTMLParser):
@@ -129,11 +95,18 @@ class Page(HTMLParser):
         return np.array(numeric, dtype=np.float64)
 
 
-def study_with(study: Study, companion: str | None = None, **campaign: Mapping) -> Study:
-    """Copy a study with other decisions of its campaign."""
-    settings = CampaignSettings.model_validate(study.campaign.model_dump() | campaign)
-    update = {"campaign": settings}
-    return study.model_copy(update=update if companion is None else update | {"companion": companion})
+@pytest.fixture(scope="session")
+def plotly() -> str:
+    """The 4.8 MB of plotly.js."""
+    return get_plotlyjs()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _small_pages(plotly: str) -> Iterator[None]:
+    """Leave plotly.js out of the pages: they are read much faster."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(html, "get_plotlyjs", lambda: "/* plotly.js v0 */")
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -162,8 +135,13 @@ def campaign(study: Study) -> Campaign:
 
 
 @pytest.fixture(scope="session")
-def page(campaign: Campaign, study: Study) -> Page:
-    return Page(render_page(campaign, study, provenance={"device": "cpu", "seconds": 12.5}))
+def page_text(campaign: Campaign, study: Study) -> str:
+    return render_page(campaign, study, provenance={"device": "cpu", "seconds": 12.5})
+
+
+@pytest.fixture(scope="session")
+def page(page_text: str) -> Page:
+    return Page(page_text)
 
 
 @pytest.fixture(scope="session")

@@ -17,6 +17,7 @@ from doe.discrepancy import Settings, Verdict
 from experiments.calibrate import Campaign, calibrate
 from experiments.report import HeapPicture, SolidHeap, render_page
 from experiments.report.discovery import render_discovery
+from experiments.report.kit import html
 from experiments.report.kit.theme import DARK, LIGHT
 from experiments.studyfile import Study, load_study
 
@@ -28,7 +29,8 @@ ARGUMENTS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disabl
 PATIENCE = 240_000
 """Milliseconds that a page may take where a dozen processes share a core and WebGL is drawn in software."""
 
-WIDTHS, SCHEMES = (1280, 390), ("light", "dark")
+SHOWN = ((1280, "light"), (390, "dark"))
+"""Windows: width and colours."""
 
 THROUGH = """async () => {
   for (let y = 0; y < document.documentElement.scrollHeight; y += window.innerHeight) {
@@ -96,6 +98,7 @@ def files(
     discovered: Callable,
     terms,
     whole_study: Study,
+    plotly: str,
 ) -> dict[str, Path]:
     """A calibration's page and a search's, with all that they can hold."""
     folder, picture = (
@@ -104,6 +107,8 @@ def files(
     )
     study = changed(load_study(None, "bench"), selection={"keep": ("E", "F")})
     found: Campaign = calibrate(study, heaps())
+    monkeypatch = pytest.MonkeyPatch()
+    monkeypatch.setattr(html, "get_plotlyjs", lambda: plotly)
     pages = {
         "calibration": render_page(found, study, [picture], {"device": "cpu"}, solid=small_heap()),
         "search": render_discovery(
@@ -111,6 +116,7 @@ def files(
             {"device": "cpu"}, solid=small_heap(),
         ),
     }  # fmt: skip
+    monkeypatch.undo()
     for name, text in pages.items():
         (folder / f"{name}.html").write_text(text, encoding="utf-8")
     return {name: folder / f"{name}.html" for name in pages}
@@ -130,9 +136,7 @@ def read_through(context: BrowserContext, file: Path, width: int, scheme: str) -
 
 @pytest.fixture(
     scope="module",
-    params=[
-        (name, width, scheme) for name in ("calibration", "search") for width in WIDTHS for scheme in SCHEMES
-    ],
+    params=[(name, *shown) for name in ("calibration", "search") for shown in SHOWN],
     ids=lambda shown: "-".join(map(str, shown)),
 )
 def opened(request: pytest.FixtureRequest, browser: Browser, files: dict[str, Path]) -> Iterator[Opened]:

@@ -12,9 +12,9 @@ import pytest
 from doe.discrepancy import Interval
 from experiments.discover.search import Search
 from experiments.io.errors import StudyError
-from experiments.report.companion import STUDIES, companion_of
 from experiments.report.discovery.terms import Terms
 from experiments.report.kit.markdown import markdown_table
+from experiments.report.study_companion import STUDIES, companion_of
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import OBSERVABLES
 
@@ -36,9 +36,7 @@ def found(named: tuple[str, ...], size: Interval) -> SimpleNamespace:
 
 
 def test_a_study_without_a_companion_has_one_that_brings_nothing(small_study: Study) -> None:
-    nothing = companion_of(small_study)
-    assert nothing.published() is None
-    assert nothing.planned_runs(3) == {}
+    assert companion_of(small_study).discovery_chapters(None, None, Path()) == ()
 
 
 def test_an_unknown_companion_is_refused_with_a_guess(write_study: Callable[..., Path]) -> None:
@@ -54,13 +52,6 @@ def test_every_companion_is_that_of_its_study() -> None:
         study = load_study(STUDIES / name / "study.toml")
         assert study.companion == name
         assert type(companion_of(study)).__module__ == f"experiments.studies.{name}.companion"
-
-
-def test_the_papers_runs_are_34_in_four_batches() -> None:
-    batches = companion_of(load_study()).planned_runs(2)
-    assert {title: len(table) for title, table in batches.items()} == {
-        "paper, screening": 24, "paper, climb": 12, "paper, composite": 26, "paper, verification": 6,
-    }  # fmt: skip
 
 
 def test_the_trial_sets_the_truth_beside_what_was_found_in_its_own_data(terms: Terms, tmp_path: Path) -> None:

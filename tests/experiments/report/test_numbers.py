@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pandas as pd
 import pytest
 
 from experiments.report.kit.html import flat
+from experiments.report.kit.markdown import markdown_table
 from experiments.report.kit.numbers import (
     enumeration,
     equation,
@@ -15,6 +17,7 @@ from experiments.report.kit.numbers import (
     significant,
     trimmed,
 )
+from experiments.report.kit.table import Column, make_table
 
 
 @pytest.mark.parametrize(
@@ -49,3 +52,13 @@ def test_an_equation_is_typeset_with_signs_and_powers(read_page: type) -> None:
         == "−60.80 + 121.2 E·F − 72.09 E2"
     )
     assert "<sup>2</sup>" in text
+
+
+def test_a_markdown_table_is_one() -> None:
+    frame = pd.DataFrame({"name": ["a|b", "c"], "size": [1.0, 2.5]})
+    columns = [Column("name", "name"), Column("size", "size", "ratio", "mm")]
+    table = make_table("t", frame, columns, "Sizes.", "A note.", ["strong", ""])
+    assert markdown_table(table).splitlines() == [
+        "*Sizes.*", "", "| name | size [mm] |", "| --- | ---: |", "| **a\\|b** | 1.00 |", "| c | 2.50 |", "",
+        "A note.",
+    ]  # fmt: skip

@@ -7,10 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from experiments.calibrate import Campaign, Outcome
 from experiments.report import HeapPicture, render_page
 from experiments.report.campaign_page import study_facts
+from experiments.report.kit import html
 from experiments.report.kit.numbers import prose
 from experiments.studies.buckwheat import paper
 from experiments.studyfile import Study, load_study
@@ -24,11 +26,13 @@ def test_the_page_is_well_formed_and_its_contents_lead_somewhere(page) -> None:
     assert inner <= set(page.ids)
 
 
-def test_the_page_needs_no_network(campaign: Campaign, study: Study, page, read_page: type) -> None:
+def test_the_page_needs_no_network(
+    campaign: Campaign, study: Study, read_page: type, plotly: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(html, "get_plotlyjs", lambda: plotly)
     picture = HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8))
     text = render_page(campaign, study, [picture])
     assert all(link.startswith(("#", "data:")) for link in read_page(text).links)
-    plotly = text[text.index("<script>") : text.index("</script>", text.index("<script>"))]
     assert "plotly.js v" in plotly
     assert "://" not in text.replace(plotly, "")
     assert text.count("plotly.js v") == plotly.count("plotly.js v")
@@ -40,14 +44,17 @@ def test_every_number_of_the_tables_is_the_results_own(campaign: Campaign, page)
     effects = screen.table.sort_values("rank")
     published = paper.screening().table.loc[effects.index, ["F", "p"]]
     columns = ["rank", "effect", "sum_sq", "percent", "F", "t", "p"]
+    full = surface.leading.full.anova
     expected = {
-        "effects": np.column_stack([effects[columns], published]),
+        "effects": effects[columns].to_numpy(),
+        "paper-effects": np.column_stack([effects[["F", "p"]], published]),
         "screening-anova": screen.anova.to_numpy(),
         "screening-design": np.column_stack(
             [campaign.screening.design.coded.reset_index(), campaign.screening.leading.measured]
         ),
         "climb": campaign.climb.path.reset_index().to_numpy(),
-        "anova-full": np.column_stack([surface.leading.full.anova, paper.surface().anova[["F", "p"]]]),
+        "anova-full": full.to_numpy(),
+        "paper-anova-full": np.column_stack([full[["F", "p"]], paper.surface().anova[["F", "p"]]]),
         "surface-design": np.column_stack(
             [surface.design.natural.reset_index(), surface.design.points, surface.leading.measured]
         ),
@@ -90,9 +97,8 @@ def test_every_chart_has_a_place_finite_numbers_and_axes_with_titles(page) -> No
         assert axes["yaxis"]["title"].get("text") or name in ("pareto-chart", "verification-chart")
 
 
-def test_marked_rows_are_the_significant_ones(campaign: Campaign, study: Study) -> None:
-    text = render_page(campaign, study)
-    table = text[text.index('<table id="table-anova-full">') :]
+def test_marked_rows_are_the_significant_ones(campaign: Campaign, page_text: str) -> None:
+    table = page_text[page_text.index('<table id="table-anova-full">') :]
     table = table[: table.index("</table>")]
     assert table.count('<tr class="strong">') == int((campaign.surface.leading.full.anova["p"] < 0.05).sum())
 
@@ -116,9 +122,12 @@ def test_only_the_papers_study_shows_the_papers_numbers(
         assert ("paper" in shown.ids) is expected
         assert ("table-paper-climb" in shown.tables) is expected
         assert any(head.startswith("paper, ") for heads in shown.heads.values() for head in heads) is expected
-        assert ("The paper kept E and F" in shown.text) is expected
+        assert ("The paper kept E and F and chose E = 0.482 and F = 0.446" in shown.text) is expected
     assert len(page.rows("misprints")) == len(paper.misprints())
-    assert [row[0][0] for row in page.rows("tests")] == ["angle", "the paper"]
+    assert [row[0][0] for name in ("tests", "paper-tests") for row in page.rows(name)] == [
+        "angle",
+        "the paper",
+    ]
 
 
 def test_the_facts_name_the_spheres_of_every_shape(write_study: Callable[..., Path]) -> None:

@@ -12,7 +12,6 @@ from types import SimpleNamespace
 import pytest
 
 from experiments.calibrate import Campaign, calibrate
-from experiments.report import render_page
 from experiments.report.cautions import FEW_GRAINS, cautions
 from experiments.report.kit.latex import latex_text
 from experiments.report.kit.numbers import prose
@@ -43,8 +42,8 @@ def test_the_verdict_names_its_factors_in_words(campaign: Campaign) -> None:
     assert NUMBER.search(verdict_sentence(campaign)) is None
 
 
-def test_a_summary_tells_each_number_once(campaign: Campaign, study: Study) -> None:
-    text = section_of(render_page(campaign, study), "summary")
+def test_a_summary_tells_each_number_once(page_text: str) -> None:
+    text = section_of(page_text, "summary")
     numbers = Counter(NUMBER.findall(text))
     assert len(numbers) > 5
     assert [number for number, times in numbers.items() if times > 1] == []
@@ -52,9 +51,9 @@ def test_a_summary_tells_each_number_once(campaign: Campaign, study: Study) -> N
 
 @pytest.mark.parametrize("name", ["noise_floor", "climb", "surface", "optimum", "verification"])
 def test_a_paragraph_does_not_repeat_what_a_decision_says(
-    name: str, campaign: Campaign, study: Study
+    name: str, campaign: Campaign, page_text: str
 ) -> None:
-    page = render_page(campaign, study)
+    page = page_text
     begin = page.index(f'<section id="{name}"')
     chapter = page[begin : page.index("</section>", begin)]
     decided = " ".join(re.findall(r'<p class="outcome">(.*?)</p>', chapter, flags=re.S))
@@ -64,10 +63,9 @@ def test_a_paragraph_does_not_repeat_what_a_decision_says(
     assert not set(NUMBER.findall(decided)) & set(NUMBER.findall(above))
 
 
-def test_cautions_come_before_the_values(campaign: Campaign, study: Study) -> None:
-    page = render_page(campaign, study)
+def test_cautions_come_before_the_values(page_text: str) -> None:
     texts = ("Calibrated.", "Before you use these values", "Enter these values")
-    places = [page.index(text) for text in texts]
+    places = [page_text.index(text) for text in texts]
     assert places == sorted(places)
 
 

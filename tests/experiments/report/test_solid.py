@@ -42,13 +42,13 @@ def test_spheres_come_back_as_they_were() -> None:
 
 def test_a_heap_of_thousands_of_grains_takes_half_a_megabyte(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(solid, "PIXELS", PIXELS)
-    packed = SolidHeap.of("A heap.", heap(2490))
+    packed = SolidHeap.of("A heap.", heap(2490, 3))
     assert packed is not None
-    # Ten bytes a sphere, four letters for three bytes.
+    # Ten bytes a sphere, four letters for three bytes; grains of nine spheres take three times as many.
     letters = len(packed.spheres) + len(packed.grains)
-    assert letters == pytest.approx(10 * 9 * 2490 * 4 / 3, rel=1e-3)
+    assert letters == pytest.approx(10 * 3 * 2490 * 4 / 3, rel=1e-3)
     assert packed.picture.image.shape[1] > PIXELS
-    assert letters + len(packed.picture.data_uri) < 0.6e6
+    assert 3 * letters + len(packed.picture.data_uri) < 0.6e6
 
 
 def test_a_heap_that_no_phone_could_draw_is_left_out() -> None:

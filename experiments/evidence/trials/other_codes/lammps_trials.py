@@ -269,6 +269,5 @@ def _lift(bench: Bench) -> str:
 
 
 def _rest(bench: Bench, name: str) -> str:
-    settles = name == "settle"
-    limit = bench.lift.settle_limit if settles else bench.lift.rest_limit
-    return rest_loop(bench.lift, name, limit, _LIFT_ANYWAY if settles else text.QUIT, bench.check_steps)
+    ends = _LIFT_ANYWAY if name == "settle" else text.QUIT
+    return rest_loop(bench.lift, name, ends, bench.check_steps)

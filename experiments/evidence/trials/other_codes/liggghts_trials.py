@@ -76,7 +76,13 @@ def liggghts_files(bench: Bench) -> dict[str, str]:
     scene, end = bench.scene, _END.format(check=bench.check_steps)
     side = _PLATE_REST * scene.room(bench.lift.reach)[0]
     plate = side * np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]]])
-    phases = [_setup(bench), _rest(bench, "settle"), _lift(bench), _rest(bench, "rest"), end]
+    phases = [
+        _setup(bench),
+        rest_loop(bench.lift, "settle", "quit", bench.check_steps),
+        _lift(bench),
+        rest_loop(bench.lift, "rest", "quit", bench.check_steps),
+        end,
+    ]
     return {
         TUBE: stl_text("tube", _tube(scene)),
         PLATE: stl_text("plate", plate),
@@ -235,8 +241,3 @@ def _lift(bench: Bench) -> str:
         ),
         still=still,
     )
-
-
-def _rest(bench: Bench, name: str) -> str:
-    limit = bench.lift.settle_limit if name == "settle" else bench.lift.rest_limit
-    return rest_loop(bench.lift, name, limit, "quit", bench.check_steps)

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from dem_warp import Case, CaseResult
+from experiments.evidence.studies.buckwheat.replay.runs import planned_cases
 from experiments.evidence.verification.check import Curve, Plot, Result, Row, absolute_row
 from experiments.evidence.verification.problems.heap_angle import with_numerics
 from experiments.evidence.verification.problems.stored import finished_cases, repose_angles
-from experiments.studies.buckwheat.replay.runs import planned_cases
 from experiments.studyfile import Study, load_study
 
 FRACTIONS = (0.25, 0.5, 1.0)

@@ -106,7 +106,7 @@ def test_what_a_code_lacks_is_refused_by_name_unless_the_nearest_will_do(
     write_study: Write, liggghts: Callable[[str], None]
 ) -> None:
     liggghts("")
-    with pytest.raises(InputError, match="rolling = 'own_spin': LIGGGHTS has none such") as refused:
+    with pytest.raises(InputError, match="rolling = 'own_spin': LIGGGHTS lacks it") as refused:
         engine_of(study_for(write_study, "liggghts", approximate=False))
     assert "or [engine] approximate = true" in str(refused.value)
     assert engine_of(study_for(write_study, "liggghts")) is not None

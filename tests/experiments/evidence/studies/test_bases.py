@@ -22,9 +22,9 @@ from experiments.evidence.studies.buckwheat.bases.base_heaps import (
 from experiments.evidence.studies.buckwheat.bases.choice import BaseChoice, Candidate, Misfits, written
 from experiments.evidence.studies.buckwheat.bases.choice_tables import choice_tables
 from experiments.evidence.studies.buckwheat.bases.grid import bases, chosen_bases, grid
+from experiments.evidence.studies.buckwheat.replay.replay import Replay
+from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS
 from experiments.io.errors import InputError, StoreError
-from experiments.studies.buckwheat.replay.replay import Replay
-from experiments.studies.buckwheat.replay.runs import DESIGNS
 from imaging import heap_angle
 
 PRINTED = "edem-printed-endless"

@@ -10,12 +10,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from experiments.evidence.studies.buckwheat.replay.replay import ALL, Replay, published_noise
+from experiments.evidence.studies.buckwheat.replay.runs import (
+    DESIGNS,
+    OPTIMUM,
+    STAGES,
+    planned_cases,
+    published_runs,
+)
 from experiments.io.errors import StudyError
 from experiments.runs import campaign as run
 from experiments.runs.campaign import Desk, check_runs, replay_published
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.replay.replay import ALL, Replay, published_noise
-from experiments.studies.buckwheat.replay.runs import DESIGNS, OPTIMUM, STAGES, planned_cases, published_runs
 from experiments.studyfile import Study, load_study
 
 

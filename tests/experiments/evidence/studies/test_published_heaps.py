@@ -23,10 +23,10 @@ from experiments.evidence.studies.buckwheat.records.published_heaps import (
     published_settings,
     tables_emulator,
 )
+from experiments.evidence.studies.buckwheat.replay.replay import Replay
+from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, planned_cases
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.replay.replay import Replay
-from experiments.studies.buckwheat.replay.runs import DESIGNS, planned_cases
 
 NOISE = 0.6
 """Seed noise of a made-up heap [deg], as simulated ones have it."""

@@ -16,12 +16,12 @@ from dem_warp.clumps import ClumpShape
 from experiments.cases import Store, execute
 from experiments.cases.workers import own
 from experiments.evidence.studies.buckwheat import seed_clumps
+from experiments.evidence.studies.buckwheat.replay.replay import Replay
 from experiments.evidence.studies.buckwheat.sensitivity import __main__ as sensitivities
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.evidence.studies.buckwheat.sensitivity.variants import BASE, chosen_variants, variants
 from experiments.io.errors import InputError, StoreError
-from experiments.measurement.case_observables import Observed
-from experiments.studies.buckwheat.replay.replay import Replay
+from experiments.measurement.states import Observed
 from experiments.studyfile.study import MeasurementSection
 
 FREE = {"base", "fit-middle", "fit-lower", "fit-upper", "two-views"}

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from doe import Agreement
 from experiments.evidence.studies.buckwheat.bases.base_heaps import Folder, angle_column
 from experiments.evidence.studies.buckwheat.bases.grid import Base, bases, grid
+from experiments.evidence.studies.buckwheat.replay.replay import Replay
+from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import SETTINGS
-from experiments.studies.buckwheat.replay.replay import Replay
-from experiments.studies.buckwheat.replay.runs import DESIGNS
 
 FloatArray = NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pandas as pd
 
 from experiments.evidence.studies.buckwheat.bases.choice import AXES, BaseChoice
+from experiments.evidence.studies.buckwheat.replay.replay import published_noise
+from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, TABLES
 from experiments.report.kit.numbers import estimate, fixed
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
-from experiments.studies.buckwheat.replay.replay import published_noise
-from experiments.studies.buckwheat.replay.runs import DESIGNS, TABLES
 
 SHOWN = 15
 """Candidates of least rmse that are shown, beside the study as written in every reading."""

@@ -1,8 +1,8 @@
 """The record of the paper's runs: gathered from the folders that made it, its page written anew.
 
-    dem-warp calibrate --scale paper --follow-paper --out out/paper
+    python -m experiments.evidence.studies.buckwheat --campaign --scale paper --out out/paper
     python -m experiments.evidence.studies.buckwheat.sensitivity --modulus-scale 10 --out out/sensitivities
-    dem-warp calibrate --scale bench --only-paper --out out/bench
+    python -m experiments.evidence.studies.buckwheat --scale bench --out out/bench
     python -m experiments.evidence.studies.buckwheat.bases simulate --modulus-scale 100 --out out/bases
     python -m experiments.evidence.studies.buckwheat.bases measure --out out/bases
     python -m experiments.evidence.studies.buckwheat.records.paper_record --paper out/paper \\
@@ -22,29 +22,28 @@ import typer
 
 from experiments.evidence.studies.buckwheat.bases.base_heaps import Folder
 from experiments.evidence.studies.buckwheat.bases.grid import bases
-from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import SETTINGS
-from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
-from experiments.io.files import copy_file, write_text
-from experiments.report.material_card import CARD
-from experiments.runs.campaign import RECORD
-from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.records.paper_page import (
+from experiments.evidence.studies.buckwheat.records.paper_page import (
     BASES,
     CAMPAIGN,
     HEAPS,
     PROVENANCE,
+    RECORD,
     RUNS,
     SENSITIVITIES,
     write_record_page,
 )
+from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import SETTINGS
+from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
+from experiments.io.files import copy_file, write_text
+from experiments.report.material_card import CARD
 
-FOLDER = Path(paper.__file__).with_name(RECORD)
+FOLDER = Path(__file__).parents[1] / RECORD
 
 
 def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
-    """Take over the runs of ``dem-warp calibrate --follow-paper`` or ``--only-paper`` from its folder.
+    """Copy the paper's runs from the folder that they were simulated in.
 
-    Where the machine that made them had no repository, the commit is given.
+    A `commit` is given when the machine that made them had no repository.
     """
     for name in (RUNS, PROVENANCE):
         copy_file(source / RECORD / name, record / name)

@@ -36,7 +36,7 @@ from experiments.studies.buckwheat import paper
 from experiments.studyfile import Study, load_study
 
 STUDY = Path(paper.__file__).with_name("curve_to_point.toml")
-FOLDER = Path(paper.__file__).with_name("point")
+FOLDER = Path(__file__).parents[1] / "point"
 CASES, PROVENANCE, PAGE = "cases.csv", "provenance.json", "README.md"
 KEY = ["stage", "scene", "run", "replicate", "seed"]
 """Columns that name a case."""

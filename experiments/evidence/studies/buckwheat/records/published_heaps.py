@@ -31,11 +31,11 @@ from doe.discrepancy.emulation.run_noise import Noise
 from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import gather
 from doe.discrepancy.fitting.model_fit import minimise, whiten
+from experiments.evidence.studies.buckwheat.replay.replay import Replay
+from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, published_runs
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.evidence.studies.buckwheat.sensitivity.variants import BASE, variants
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.replay.replay import Replay
-from experiments.studies.buckwheat.replay.runs import DESIGNS, published_runs
 
 OBSERVABLE = "flank_angle"
 

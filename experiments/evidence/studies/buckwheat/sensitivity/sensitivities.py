@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from experiments.evidence.studies.buckwheat.replay.replay import LEAST_RUNS, Replay
+from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import SETTINGS
 from experiments.evidence.studies.buckwheat.sensitivity.variants import BASE, variants
-from experiments.studies.buckwheat.replay.replay import LEAST_RUNS, Replay
-from experiments.studies.buckwheat.replay.runs import DESIGNS
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, TABLES
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
 from experiments.report.kit.numbers import fixed
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
-from experiments.studies.buckwheat.replay.runs import DESIGNS, TABLES
 
 NOT_RUN, TOO_FEW = "not run", "too few angles"
 

@@ -11,9 +11,9 @@ from typing import Any
 import pandas as pd
 from pydantic import Field
 
+from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, planned_cases
 from experiments.io.errors import InputError
 from experiments.io.texts import nearest_name
-from experiments.studies.buckwheat.replay.runs import DESIGNS, planned_cases
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import Places

@@ -1,0 +1,239 @@
+"""The record of the paper's runs simulated again: a folder whose page is made from the tables beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from dem_warp import CaseResult
+from doe import Agreement, agreement
+from doe.plots import agreement_plot
+from experiments.calibrate.results import Campaign
+from experiments.evidence.studies.buckwheat.bases.choice import BaseChoice
+from experiments.evidence.studies.buckwheat.bases.choice_tables import choice_tables
+from experiments.evidence.studies.buckwheat.replay.replay import RUN, Replay
+from experiments.evidence.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
+from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, TABLES
+from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
+from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_tables import sensitivity_tables
+from experiments.io.files import replacing, write_text
+from experiments.io.plain_data import jsonable
+from experiments.report.kit.figure import save_figure
+from experiments.report.kit.markdown import facts_list, markdown_page, markdown_table, wall_times_table
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
+from experiments.report.material_card import CARD
+from experiments.report.pictures import heap_row
+from experiments.studyfile import Study
+from imaging import save_picture
+
+PAGE, RUNS, PROVENANCE, CAMPAIGN = "README.md", "runs.csv", "provenance.json", "campaign.json"
+RECORD = "record"
+"""Folder of the page in that of the runs."""
+HEAPS, SCATTER, NOTES = "heaps.png", "agreement.png", "notes.md"
+SENSITIVITIES, BASES = "sensitivities", "bases"
+"""Folders of the variants' angles, and of those of the bases that were tried."""
+
+SHOWN = {"Screening 3": ("screening", 3), "Screening 12": ("screening", 12), "Optimum": ("verification", 1)}
+"""Runs in the picture of heaps."""
+HEAPS_TITLE = "Screening run 3, screening run 12 and the published optimum, at one scale"
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Everything that a record's page is made from."""
+
+    replay: Replay
+    """The paper's runs at full scale."""
+    provenance: Mapping[str, Any]
+    """Origin of the numbers: commit, machine, date, wall times."""
+    campaign: Mapping[str, Any] | None = None
+    """A campaign of our own beside it: outcome, reason, effects of its screening."""
+    card: bool = False
+    """There is a card of the material that it chose."""
+    scales: Mapping[str, Replay] = field(default_factory=dict)
+    """The same runs at smaller scales, by name."""
+    sensitivities: Sensitivities | None = None
+    bases: BaseChoice | None = None
+    picture: bool = False
+    """There is a picture of heaps."""
+    notes: str = ""
+    """A person's reading of the numbers, Markdown."""
+
+    @classmethod
+    def read(cls, folder: Path) -> Record:
+        """Read the tables of a record; a folder that holds none raises `FileNotFoundError`."""
+        campaign = folder / CAMPAIGN
+        scales = {path.stem.removeprefix("runs-"): path for path in sorted(folder.glob("runs-*.csv"))}
+        return cls(
+            Replay(pd.read_csv(folder / RUNS)),
+            json.loads((folder / PROVENANCE).read_text(encoding="utf-8")),
+            json.loads(campaign.read_text(encoding="utf-8")) if campaign.is_file() else None,
+            (folder / CARD).is_file(),
+            {name: Replay(pd.read_csv(path)) for name, path in scales.items()},
+            Sensitivities.read(folder / SENSITIVITIES),
+            BaseChoice.read(folder / BASES),
+            (folder / HEAPS).is_file(),
+            (folder / NOTES).read_text(encoding="utf-8") if (folder / NOTES).is_file() else "",
+        )
+
+
+def write_record(
+    folder: Path, cases: pd.DataFrame, provenance: Mapping[str, Any], campaign: Campaign | None = None
+) -> Path:
+    """Write the tables of a record, and its page; return the page.
+
+    Its cases are the paper's runs simulated again; the campaign is our own, to be set beside. What stands in
+    the folder of a picture, of other scales or of sensitivities is taken in.
+    """
+    write_text(folder / RUNS, cases.to_csv(index=False))
+    write_text(folder / PROVENANCE, _json(provenance))
+    if campaign is not None:
+        write_text(folder / CAMPAIGN, _json(campaign_facts(campaign)))
+    return write_record_page(folder)
+
+
+def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str], CaseResult]) -> None:
+    """Draw the first heaps of three runs next to each other, those that were measured.
+
+    `load` finds the result of a case by its ``case_key``, as ``Store.load`` does.
+    """
+    cases = replay.measured
+    shown = {}
+    for title, (stage, run) in SHOWN.items():
+        found = cases[(cases["stage"] == stage) & (cases["run"] == run)]
+        if found.empty:
+            continue
+        published = replay.runs.set_index(RUN)["published"][stage, run]
+        first = found.iloc[0]
+        shown[f"{title}: {first['angle']:.1f} deg, published {published:.1f}"] = load(str(first["case_key"]))
+    if not shown:
+        return
+    with replacing(folder / HEAPS) as temporary:
+        save_picture(temporary, heap_row(study, shown))
+
+
+def write_record_page(folder: Path) -> Path:
+    """Write the page of a record, and its plot, anew from the tables beside it."""
+    record = Record.read(folder)
+    runs = record.replay.runs[lambda runs: runs["stage"].isin(DESIGNS) & runs["angle"].notna()]
+    groups = [TABLES[stage] for stage in runs["stage"]]
+    figure = agreement_plot(record.replay.agreement(), groups, "simulated angle [°]", "published angle [°]")
+    save_figure(figure, folder / SCATTER, dpi=130)
+    write_text(folder / PAGE, record_page(record))
+    return folder / PAGE
+
+
+def campaign_facts(campaign: Campaign) -> dict[str, Any]:
+    """Keep of a campaign what a record shows: outcome, reason, effects of its screening."""
+    facts: dict[str, Any] = {"outcome": campaign.outcome.value, "reason": campaign.reason}
+    if campaign.screening is not None:
+        effects = campaign.screening.leading.screen.table[["effect", "p", "rank"]]
+        facts["effects"] = {str(name): dict(row) for name, row in effects.iterrows()}
+    return facts
+
+
+def campaign_effects(campaign: Mapping[str, Any] | None) -> pd.DataFrame | None:
+    """Effects of a campaign's screening by factor, from what `campaign_facts` keeps."""
+    if campaign is None or "effects" not in campaign:
+        return None
+    return pd.DataFrame.from_dict(campaign["effects"], orient="index")
+
+
+def record_page(record: Record) -> str:
+    """Write the page as Markdown."""
+    tables = replay_tables(record.replay, campaign_effects(record.campaign))
+    return markdown_page(
+        "# The paper's runs, simulated again",
+        "Every run of Tables 3, 5 and 6 of the paper and its verification, beside the published angles. This "
+        "page is made from the files beside it: "
+        "`python -m experiments.evidence.studies.buckwheat.records.paper_record --help`.",
+        facts_list(record.provenance),
+        wall_times_table(record.provenance, "heaps"),
+        "## Agreement",
+        markdown_table(tables["agreement"]),
+        f"![Simulated against published angles]({SCATTER})",
+        record.notes,
+        *(["## Heaps", f"![{HEAPS_TITLE}]({HEAPS})"] if record.picture else []),
+        *_section("Screening", tables, "effects"),
+        *([ranking_sentence(record.replay)] if "effects" in tables else []),
+        *_section("Response surface", tables, "anova", "coefficients"),
+        *_section("Where the friction of steel acts", tables, "course", "slopes"),
+        *_section("Verification", tables, "verification"),
+        *_campaign(record),
+        *_scales(record),
+        *_sensitivities(record.sensitivities),
+        *_bases(record.bases),
+        "## Every run",
+        markdown_table(tables["runs"]),
+        f"Every heap, with its seed, stands in [{RUNS}]({RUNS}).",
+    )
+
+
+def _section(title: str, tables: Mapping[str, Table], *names: str) -> list[str]:
+    found = [markdown_table(tables[name]) for name in names if name in tables]
+    return [f"## {title}", *found] if found else []
+
+
+def _campaign(record: Record) -> list[str]:
+    if record.campaign is None:
+        return []
+    outcome = f"Outcome: {record.campaign['outcome']}. {record.campaign['reason']}"
+    card = f"The material, and all settings that are as good: [{CARD}]({CARD})." if record.card else ""
+    return ["## Our own campaign", outcome, card]
+
+
+def scale_cost(small: Replay, full: Replay) -> Agreement:
+    """Angles of the 31 runs at a smaller scale against those at full scale, run by run."""
+    pair = full.runs.set_index(RUN).join(small.runs.set_index(RUN)[["angle", "n"]].add_prefix("small_"))
+    pair = pair[pair.index.get_level_values("stage").isin(DESIGNS)].dropna(subset=["angle", "small_angle"])
+    stage = pair.index.get_level_values("stage")
+    noise = pd.Series(stage.map(small.heap_variance), pair.index) / pair["small_n"]
+    reference = pd.Series(stage.map(full.heap_variance), pair.index) / pair["n"]
+    return agreement(pair["small_angle"], pair["angle"], noise, float(reference.mean()), strata=stage)
+
+
+def _scales(record: Record) -> list[str]:
+    if not record.scales:
+        return []
+    rows = []
+    for name, replay in record.scales.items():
+        cost = scale_cost(replay, record.replay)
+        estimates = ("rmse", "rmse_without_noise", "bias", "slope", "spearman")
+        row = {"scale": name, "runs": cost.runs, "published": replay.agreement().rmse.value}
+        rows.append(row | {estimate: getattr(cost, estimate).value for estimate in estimates})
+    shown: Layout = [
+        "scale",
+        Column("runs", "runs", "label"),
+        *columns("angle", "°", rmse="rmse against full scale", rmse_without_noise="noise of both out"),
+        *columns("angle", "°", bias="bias"),
+        *columns("ratio", slope="slope", spearman="Spearman"),
+        *columns("angle", "°", published="rmse against the paper"),
+    ]
+    table = make_table("scales", pd.DataFrame(rows), shown, "The 31 runs at smaller scales.")
+    return ["## What a smaller scale costs", markdown_table(table)]
+
+
+def _sensitivities(found: Sensitivities | None) -> list[str]:
+    if found is None:
+        return []
+    tables = sensitivity_tables(found)
+    return ["## What the paper does not say", *(markdown_table(table) for table in tables.values())]
+
+
+def _bases(found: BaseChoice | None) -> list[str]:
+    if found is None:
+        return []
+    tables = choice_tables(found)
+    return [
+        "## The base, chosen by leaving tables out",
+        *(markdown_table(table) for table in tables.values()),
+    ]
+
+
+def _json(value: Mapping[str, Any]) -> str:
+    return json.dumps(jsonable(value), indent=1, allow_nan=False) + "\n"

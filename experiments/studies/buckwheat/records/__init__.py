@@ -1,1 +1,0 @@
-"""Pages of the kept records, written from the files beside them."""

@@ -1,1 +1,0 @@
-"""Outlines of heaps, and lines on their flanks."""

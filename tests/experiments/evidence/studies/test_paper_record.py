@@ -1,0 +1,168 @@
+"""The record of the paper's runs: its page follows from the tables beside it."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from analytic_heaps import analytic_heaps, study_with
+
+from experiments.calibrate import Campaign, calibrate
+from experiments.evidence.studies.buckwheat.bases.grid import bases, grid
+from experiments.evidence.studies.buckwheat.records import paper_record
+from experiments.evidence.studies.buckwheat.records.paper_page import (
+    PAGE,
+    RUNS,
+    Record,
+    record_page,
+    scale_cost,
+    write_record,
+)
+from experiments.evidence.studies.buckwheat.replay.replay import Replay
+from experiments.evidence.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
+from experiments.evidence.studies.buckwheat.replay.runs import planned_cases
+from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
+from experiments.io.errors import InputError
+from experiments.report.material_card import CARD, write_material_card
+from experiments.studyfile import Study, load_study
+from experiments.studyfile.card import read_card, with_material
+
+WALL_TIMES = [{"stage": "paper, climb", "simulated": 6, "seconds": 44.7}]
+
+
+def cases(shift: float = 0.0, replicates: int = 2) -> pd.DataFrame:
+    plan = planned_cases(replicates)
+    noise = 0.3 * np.random.default_rng(5).standard_normal(len(plan))
+    return plan.assign(status="finished", reason="", angle=plan["published"] + shift + noise)
+
+
+def numbers_of(page: str, heading: str) -> list[list[str]]:
+    """Cells of the first table below a heading, row by row."""
+    below = page.split(f"## {heading}\n", 1)[1]
+    rows = [line for line in below.splitlines() if line.startswith("|")]
+    table = rows[: next((i for i, row in enumerate(rows[2:], 2) if "---" in row), len(rows) + 1) - 1]
+    return [[cell.strip() for cell in row.strip("|").split("|")] for row in table[2:]]
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return study_with(load_study(), selection={"keep": ("E", "F")})
+
+
+@pytest.fixture(scope="module")
+def campaign(study: Study) -> Campaign:
+    return calibrate(study, analytic_heaps())
+
+
+@pytest.fixture(scope="module")
+def committed() -> Record:
+    """The record in the tree."""
+    return Record.read(paper_record.FOLDER)
+
+
+def test_the_committed_page_follows_from_the_committed_angles(committed: Record) -> None:
+    page = (paper_record.FOLDER / PAGE).read_text(encoding="utf-8")
+    assert page == record_page(committed)
+
+
+def test_the_committed_card_is_that_of_the_committed_campaign(committed: Record) -> None:
+    card = tomllib.loads((paper_record.FOLDER / CARD).read_text(encoding="utf-8"))
+    campaign = committed.campaign
+    assert campaign is not None
+    assert (card["fitted"]["outcome"], card["fitted"]["reason"]) == (campaign["outcome"], campaign["reason"])
+    study = load_study(None, "paper")
+    case = study.case({name: factor["chosen"] for name, factor in card["factor"].items()}, 1)
+    own = with_material({"material": CARD}, paper_record.FOLDER)
+    assert own["grain"]["density"] == "698 kg/m^3"
+    friction = own["contact"]["grain-wall"]["static_friction"]
+    # The card has the chosen point in full, the table of its factors four figures of it.
+    assert friction == pytest.approx(case.grain_wall.static_friction, rel=1e-3)
+
+
+def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaign) -> None:
+    page = write_record(
+        tmp_path, cases(1.5), {"device": "CPU", "wall_times": WALL_TIMES}, campaign
+    ).read_text("utf-8")
+    replay = Replay(cases(1.5))
+    shown = numbers_of(page, "Agreement")
+    expected = replay.agreement().bias
+    assert shown[-1][5] == f"{expected.value:.2f} [{expected.low:.2f},\u00a0{expected.high:.2f}]"
+    assert [row[0] for row in numbers_of(page, "Every run")].count("Table 6") == 13
+    assert "In all 6 heaps in 45 s." in page
+    # The campaign's own screening stands beside.
+    effect = campaign.screening.leading.screen.table["effect"]["F"]
+    assert f"{effect:.2f}" in next(row for row in numbers_of(page, "Screening") if "F" in row[0])
+    assert f"Outcome: {campaign.outcome.value}. {campaign.reason}" in page
+
+
+def test_a_record_takes_in_a_card_scales_sensitivities_and_notes(
+    tmp_path: Path, campaign: Campaign, study: Study
+) -> None:
+    bench, varied, record = tmp_path / "bench", tmp_path / "varied", tmp_path / "record"
+    for folder, shift in ((tmp_path / "paper", 0.0), (bench, -4.0)):
+        write_record(folder / "record", cases(shift), {"commit": None}, campaign)
+    write_material_card(campaign, study, tmp_path / "paper")
+    varied.mkdir()
+    (varied / "settings.json").write_text(
+        json.dumps({"scale": "paper", "modulus_scale": 10.0, "replicates": 1}), encoding="utf-8"
+    )
+    for name in ("base", "clump-flat"):
+        plan = variants()[name].planned_cases(1)
+        plan.assign(status="finished", reason="", angle=plan["published"] + 1.0).to_csv(
+            varied / f"{name}.csv"
+        )
+    tried = tmp_path / "tried"
+    tried.mkdir()
+    (tried / "settings.json").write_bytes((varied / "settings.json").read_bytes())
+    for name, off in (("edem-printed-endless", 3.0), ("relative-flat-round", -1.0)):
+        plan = bases()[name].variant.planned_cases(1).assign(status="finished", reason="")
+        read = {f"angle_{option.name}": plan["published"] + off for option in grid().estimator[:1]}
+        plan.assign(**read).to_csv(tried / f"{name}.csv")
+    record.mkdir()
+    (record / "notes.md").write_text("What we make of it.", encoding="utf-8")
+    paper_record.main(tmp_path / "paper", [f"bench={bench}"], varied, tried, "abc123", record)
+    page = (record / PAGE).read_text(encoding="utf-8")
+    assert "What we make of it." in page
+    assert f"]({CARD})" in page
+    clumps = [Path(read_card(folder / CARD)["grain"]["clump"]) for folder in (tmp_path / "paper", record)]
+    assert clumps[1].read_bytes() == clumps[0].read_bytes()
+    assert "- commit: abc123" in page
+    cost = scale_cost(Replay(cases(-4.0)), Replay(cases()))
+    # The same noise in both: the difference is the shift.
+    assert cost.bias.value == pytest.approx(-4.0)
+    assert numbers_of(page, "What a smaller scale costs")[0][4] == "−4.00"
+    shown = {row[1]: row for row in numbers_of(page, "What the paper does not say")}
+    assert shown["nine spheres in a pyramid of flat faces"][2] == "0.00"
+    assert shown["thirty spheres in the flat pyramid"][-1] == "not run"
+    section = "The base, chosen by leaving tables out"
+    assert numbers_of(page, section)[0][:4] == ["**relative**", "flat", "round", "flank"]
+    paper_record.main(None, None, None, None, None, record)
+    assert (record / PAGE).read_text(encoding="utf-8") == page
+
+
+def test_a_folder_without_the_papers_runs_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"{RUNS}: no such file"):
+        paper_record.gather_scale("bench", tmp_path, tmp_path / "record")
+
+
+def test_a_record_of_few_angles_says_what_can_be_said() -> None:
+    some = cases().assign(status="diverged")
+    some.loc[some["stage"] != "climb", "angle"] = np.nan
+    some.loc[:5, "angle"] = 20.0  # three screening runs
+    assert set(replay_tables(Replay(some))) == {"agreement", "runs"}
+    page = record_page(Record(Replay(some), {}))
+    assert [row[:2] for row in numbers_of(page, "Agreement")][:2] == [
+        ["Table 3, Plackett-Burman screening", "3"],
+        ["Table 5, steepest climb", "6"],
+    ]
+    assert "## Response surface" not in page
+
+
+def test_the_ranking_is_said_in_words() -> None:
+    sentence = ranking_sentence(Replay(cases()))
+    assert sentence.startswith("The two strongest factors of the screening are F and E here (F +14.")
+    assert sentence.endswith("F and E in the paper.")
