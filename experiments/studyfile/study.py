@@ -388,7 +388,8 @@ class Study(Physics):
         except GrainCountError as error:
             raise StudyError(self._place_of_grains(scene), error.problem, error.number) from None
         except ValueError as error:
-            raise StudyError(str(self.file), str(error), hint=f"The settings are {dict(settings)}.") from error
+            hint = f"The settings are {dict(settings)}."
+            raise StudyError(str(self.file), str(error), hint=hint) from error
 
     def _place_of_grains(self, scene: str) -> str:
         """Place of the number of a scene's grains, or of the container that it follows from."""

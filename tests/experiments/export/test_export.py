@@ -28,18 +28,6 @@ def contacts(case: Case) -> tuple[Contact, Contact]:
     return contacts_of(case, RADIUS, MASS)
 
 
-@pytest.mark.parametrize("name", sorted(EXPORTERS))
-def test_every_term_says_what_it_is_and_where_it_comes_from(
-    name: str, contacts: tuple[Contact, Contact]
-) -> None:
-    exporter = EXPORTERS[name]
-    for contact in contacts:
-        terms = (*exporter.material_terms(contact.first), *exporter.contact_terms(contact))
-        assert len({term.name for term in terms}) == len(terms) >= 5
-        assert all(math.isfinite(term.value) for term in terms)
-        assert all(term.unit and term.formula and exporter.code in term.source for term in terms)
-
-
 def test_reduced_size_and_mass_are_halves_between_equal_grains(contacts: tuple[Contact, Contact]) -> None:
     assert [(contact.radius, contact.mass) for contact in contacts] == [
         (RADIUS / 2, MASS / 2),

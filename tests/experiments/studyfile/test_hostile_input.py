@@ -96,7 +96,7 @@ HOSTILE = {
     ),
     "narrow tube": study("heap", '"28 mm"\nheight', '"7 mm"\nheight', "scene", "2 grains wide", "7 mm"),
     "no grain's size": study("heap", '"2 mm"', '"0 mm"', "grain.sphere", "greater than 0", "0 mm"),
-    "no clump": study("heap", 'sphere = "2 mm"', 'clump = "c.txt"', "grain.clump", "no such clump file", "c.txt"),
+    "no clump": study("heap", 'sphere = "2 mm"', 'clump = "c.txt"', "grain.clump", "no such clump", "c.txt"),
     "clump and sphere": study("heap", "[grain]", '[grain]\nclump = "s.toml"', "grain", "not both"),
     "nine megabytes": study(
         "heap", 'name = "Small"', f'nome = "{"x" * 9_000_000}"', "nome", "unknown key"
