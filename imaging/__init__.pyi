@@ -1,18 +1,16 @@
 """The public names: each is loaded with its module when it is first used."""
 
-from .drawing.heap import HeapAngle, HeapOutlines, heap_angle, heap_outlines
-from .drawing.overlay import overlay
+from .drawing.angle_overlay import overlay
 from .drawing.render import Snapshot, silhouette, snapshot
-from .errors import PictureError
-from .fits import FITS, FitSettings
-from .outline import Outline
-from .photo.finding import find_outline
-from .photo.view import View
-from .pictures import read_picture, save_picture
-from .profile import heap_profile, profile_heights
-from .reasons import Doubt
+from .drawing.simulated_heap import HeapAngle, HeapOutlines, heap_angle, heap_outlines
+from .flank.fit_settings import FITS, FitSettings
+from .flank.heap_shape import HeapShape, heap_profile, heap_shape, profile_heights
+from .flank.outline import Doubt, Outline
+from .photo.outline_finder import find_outline
+from .photo.picture_file import read_picture, save_picture
+from .photo.view_settings import View
+from .picture_error import PictureError
 from .repose import AngleDifference, ReposeAngle, compare, measure, measure_photograph
-from .shape import HeapShape, heap_shape
 
 __all__ = [
     "FITS",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from imaging.errors import PictureError
+from imaging.picture_error import PictureError
 
 FloatArray = NDArray[np.float64]
 Layer = NDArray[np.floating[Any]]
@@ -17,13 +17,13 @@ Picture = NDArray[np.uint8]
 """A picture as OpenCV holds it: (rows, columns) grey or (rows, columns, 3) blue-green-red, top row first."""
 
 CORE_FRACTION = 0.98
-"""Share of the spheres whose distance from the axis sets the scale of a picture; the rest may be strays."""
+"""Share of the spheres whose distance from the axis gives the scale of a picture; the rest may be strays."""
 CORE_MARGIN = 1.1
-"""The heap ends at about this multiple of the core's radius: 98 % of a cone lie within 0.92 of its base."""
+"""Radius of the heap over that of the core: 98 % of a cone are within 0.92 of its base's radius."""
 TALLEST = 20.0
-"""Height of what a picture shows, in heap radii: a filled tube is some 6."""
+"""Largest height in a picture, in heap radii: a filled tube has some 6."""
 FIELD_OF_VIEW = 2.0
-"""A picture reaches at most this multiple of the heap's radius; spheres that flew further are not drawn."""
+"""Largest half width of a picture, in heap radii; spheres farther away are not drawn."""
 
 
 @dataclass(frozen=True)
@@ -37,18 +37,14 @@ class Spheres:
 
     def __post_init__(self) -> None:
         if self.centers.ndim != 2 or self.centers.shape[1] != 3 or len(self.centers) == 0:
-            raise PictureError(
-                "centers", "expected centres are an (n, 3) array with n > 0", self.centers.shape
-            )
+            raise PictureError("centers", "must be an (n, 3) array with n > 0", self.centers.shape)
         if self.radii.shape != (len(self.centers),):
-            raise PictureError("radii", "expected there is one radius for each centre", self.radii.shape)
+            raise PictureError("radii", "must be one for each centre", self.radii.shape)
         bad = ~(np.isfinite(self.centers).all(axis=1) & np.isfinite(self.radii) & (self.radii > 0))
         if bad.any():
             row = int(np.argmax(bad))
             received = (*self.centers[row].tolist(), float(self.radii[row]))
-            raise PictureError(
-                f"sphere {row}", "expected centres are finite and radii finite and positive", received
-            )
+            raise PictureError(f"sphere {row}", "must be finite, with a positive radius", received)
 
     @classmethod
     def of(cls, centers: ArrayLike, radii: ArrayLike) -> Spheres:
@@ -58,10 +54,9 @@ class Spheres:
         return cls(points, np.full(len(points), float(sizes)) if sizes.ndim == 0 and points.ndim else sizes)
 
     def seen_from(self, azimuth: float) -> FloatArray:
-        """Centres in the camera's frame (n, 3): right, away from the camera, up [m].
+        """Return centres in the camera's frame (n, 3): right, away from the camera, up [m].
 
-        At azimuth 0 the picture's right is +x and the camera looks along +y; azimuth + pi gives the mirror
-        image.
+        At azimuth 0 the picture's right is +x and the camera looks along +y; azimuth + pi mirrors it.
         """
         cosine, sine = np.cos(azimuth), np.sin(azimuth)
         x, y, z = self.centers.T
@@ -70,10 +65,10 @@ class Spheres:
 
 @dataclass(frozen=True)
 class Frame:
-    """The part of space that pictures of one heap show: the same for every azimuth."""
+    """The part of space in pictures of one heap: the same for every azimuth."""
 
     axis: tuple[float, float]
-    """X and y of the heap's middle [m]."""
+    """Coordinates x and y of the heap's middle [m]."""
     half_width: float
     height: float
     """Reach of the picture to either side of the axis and above the plate [m]."""
@@ -84,9 +79,9 @@ class Frame:
 
     @classmethod
     def around(cls, spheres: Spheres, pixels: int, margin: float = 0.08) -> Frame:
-        """Frame a heap so that the heap itself, strays aside, is about `pixels` wide."""
+        """Frame a heap so that it is about `pixels` wide without strays."""
         if pixels < 16:
-            raise PictureError("pixels", "expected a heap is drawn at least 16 pixels wide", pixels)
+            raise PictureError("pixels", "must be at least 16", pixels)
         middle = np.median(spheres.centers[:, :2], axis=0)
         reach = np.hypot(*(spheres.centers[:, :2] - middle).T) + spheres.radii
         heap_radius = CORE_MARGIN * float(np.quantile(reach, CORE_FRACTION))
@@ -94,8 +89,8 @@ class Frame:
         kept = reach <= half_width
         top = float((spheres.centers[:, 2] + spheres.radii)[kept].max())
         if not 0.0 < top <= TALLEST * heap_radius:
-            rule = f"expected the heap rises above the plate z = 0, by at most {TALLEST:g} of its radii"
-            raise PictureError("centers", rule, f"{top:.4g} m at a radius of {heap_radius:.4g} m")
+            problem = f"must rise above the plate z = 0, by at most {TALLEST:g} radii of the heap"
+            raise PictureError("centers", problem, f"{top:.4g} m at a radius of {heap_radius:.4g} m")
         return cls(
             axis=(float(middle[0]), float(middle[1])),
             half_width=half_width,
@@ -121,7 +116,7 @@ class Frame:
         return self.ground_rows - 0.5
 
     def select(self, spheres: Spheres) -> tuple[Spheres, NDArray[np.intp]]:
-        """Spheres within the frame, moved so that the axis is at x = y = 0, and their indices."""
+        """Return the spheres within the frame, moved to an axis at x = y = 0, and their indices."""
         shifted = spheres.centers - np.array([*self.axis, 0.0])
         inside = np.flatnonzero(np.hypot(shifted[:, 0], shifted[:, 1]) + spheres.radii <= self.half_width)
         return Spheres(shifted[inside], spheres.radii[inside]), inside

@@ -10,16 +10,16 @@ from typing import Protocol
 import numpy as np
 from scipy import special
 
-from imaging.errors import PictureError
-from imaging.fits import FitSettings
-from imaging.flanks import FlankLine, fit_flanks
+from imaging.flank.camera_height import level_angle, level_error
+from imaging.flank.fit_settings import FitSettings
+from imaging.flank.flank_line import FlankLine, fit_flanks
+from imaging.flank.outline import Doubt, Outline
 from imaging.geometry import Picture
-from imaging.outline import Outline
 from imaging.photo.doubts import doubts_of
-from imaging.photo.finding import find_outline
-from imaging.photo.view import View, level_angle, level_error
-from imaging.pictures import focal_length, read_picture
-from imaging.reasons import Doubt
+from imaging.photo.outline_finder import find_outline
+from imaging.photo.picture_file import focal_length, read_picture
+from imaging.photo.view_settings import View
+from imaging.picture_error import PictureError
 
 
 @dataclass(frozen=True)
@@ -29,18 +29,18 @@ class ReposeAngle:
     left_line: FlankLine
     right_line: FlankLine
     fit: FitSettings
-    """Outline that the lines were fitted to."""
+    """Part of the flanks that the lines were fitted to."""
     outline: Outline
-    """Setting that they were fitted with."""
+    """Outline that the lines were fitted to."""
 
     @property
     def left(self) -> float:
-        """Angle of the left flank [degrees], the camera's height taken out."""
+        """Angle of the left flank [degrees], corrected for the camera's height."""
         return self._level(self.left_line.angle)
 
     @property
     def right(self) -> float:
-        """Angle of the right flank [degrees], the camera's height taken out."""
+        """Angle of the right flank [degrees], corrected for the camera's height."""
         return self._level(self.right_line.angle)
 
     @property
@@ -50,7 +50,7 @@ class ReposeAngle:
 
     @property
     def se(self) -> float:
-        """Standard error of the mean [degrees]: of both lines on this outline, and of the camera's height."""
+        """Standard error of the mean [degrees], from both lines and the camera's height."""
         roughness = 0.5 * float(np.hypot(self.left_line.se, self.right_line.se))
         outline = self.outline
         seen = 0.5 * (self.left_line.angle + self.right_line.angle)
@@ -63,12 +63,12 @@ class ReposeAngle:
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:
-        """Doubts about the angle; none about that of a drawn silhouette."""
+        """Doubts about the angle; empty for a drawn silhouette."""
         if not self.outline.photographed:
             return ()
-        judged = doubts_of(self.left_line, self.right_line, self.mean, self.se, self.outline)
-        told = {doubt.name for doubt in self.outline.doubts}  # a tilt that no plate shows has the lower limit
-        return (*self.outline.doubts, *(doubt for doubt in judged if doubt.name not in told))
+        found = doubts_of(self.left_line, self.right_line, self.mean, self.se, self.outline)
+        known = {doubt.name for doubt in self.outline.doubts}  # a tilt without a plate has a lower limit
+        return (*self.outline.doubts, *(doubt for doubt in found if doubt.name not in known))
 
     @property
     def dof(self) -> float:
@@ -80,19 +80,19 @@ class ReposeAngle:
         return total**2 / sum(variance**2 / dof for variance, dof in parts)
 
     def in_part(self, left: int, top: int) -> ReposeAngle:
-        """The same measurement in a part of the picture that begins at this column and row."""
+        """Return the same measurement in a part of the picture that begins at this column and row."""
         outline = self.outline.in_part(left, top)
         start = float(self.outline.position[0] - outline.position[0])
         left_line, right_line = (line.from_position(start) for line in (self.left_line, self.right_line))
         return ReposeAngle(left_line, right_line, self.fit, outline)
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Confidence interval of the mean [degrees]."""
+        """Return the confidence interval of the mean [degrees]."""
         return confidence_interval(self, level)
 
 
 class Angle(Protocol):
-    """Part that all measured angles share: mean and standard error [degrees], and how it was measured."""
+    """Common part of all measured angles: mean and standard error [degrees], and the fit."""
 
     @property
     def mean(self) -> float: ...
@@ -120,9 +120,9 @@ def measure(
 ) -> ReposeAngle:
     """Measure the repose angle of a picture, or of an outline found before.
 
-    Each flank runs from the heap's base (see `FitSettings.toe`) to its apex, the column that splits the
-    outline into a roof of two straight lines with the least squared error. theta = ``atan |k|``, where k is
-    the slope of the least-squares line through the part of the flank that `fit` names.
+    Each flank goes from the heap's base (see `FitSettings.toe`) to its apex, where two straight lines that
+    meet have the least squared error. The angle is ``atan |k|``, where k is the slope of the least-squares
+    line through the part of the flank that `fit` names.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def measure(
     place : str
         Names the picture in errors.
     view : View, optional
-        What is known of a photograph beforehand (see `find_outline`).
+        Known facts of a photograph (see `find_outline`).
 
     Raises
     ------
@@ -149,9 +149,9 @@ def measure(
 def measure_photograph(
     path: str | Path, fit: str | FitSettings = "flank", view: View | None = None
 ) -> ReposeAngle:
-    """Measure the repose angle of the heap in a picture file; raise `PictureError` when it shows none.
+    """Measure the repose angle of the heap in a picture file; raise `PictureError` if it shows no heap.
 
-    How near the camera was is taken from the focal length that it wrote into the file, if it did.
+    The camera's distance follows from the focal length in the file, if there is one.
     """
     settings = FitSettings.of(fit)
     known = view or View()
@@ -161,20 +161,18 @@ def measure_photograph(
 
 
 def compare(a: Angle, b: Angle) -> AngleDifference:
-    """Difference a - b of two angles, refused unless both were measured with the same fit.
+    """Return the difference a - b of two angles; raise `PictureError` if their fits differ.
 
-    The fit alone moves an angle by 3 to 5 degrees, more than most things that one would compare.
+    The fit alone changes an angle by 3 to 5 degrees, more than most differences of interest.
     """
     if a.fit != b.fit:
-        raise PictureError(
-            "compare", "expected compared angles were measured with the same fit", f"{a.fit} and {b.fit}"
-        )
+        raise PictureError("compare", "both angles must have the same fit", f"{a.fit} and {b.fit}")
     return AngleDifference(a.mean - b.mean, float(np.hypot(a.se, b.se)))
 
 
 def confidence_interval(angle: Angle, level: float) -> tuple[float, float]:
-    """Interval that holds the true mean with probability `level` [degrees], from Student's t."""
+    """Return the interval that holds the true mean with probability `level` [degrees], by Student's t."""
     if not 0.0 < level < 1.0:
-        raise PictureError("level", "expected 0 < level < 1", level)
+        raise PictureError("level", "must be between 0 and 1", level)
     reach = float(special.stdtrit(angle.dof, 0.5 + 0.5 * level)) * angle.se
     return angle.mean - reach, angle.mean + reach

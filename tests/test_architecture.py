@@ -220,7 +220,7 @@ def test_every_library_is_declared() -> None:
         ("doe.discrepancy", {"numpy", "pandas", "scipy"}),
         ("doe.discrepancy.analysis", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot", "sklearn"}),
         ("imaging", {"cv2", "numpy", "scipy"}),
-        ("imaging.drawing.heap", {"warp", "pyvista", "vtkmodules", "pandas"}),
+        ("imaging.drawing.simulated_heap", {"warp", "pyvista", "vtkmodules", "pandas"}),
         ("experiments.cli", {"warp", "pyvista", "pandas", "cv2", "statsmodels", "plotly"}),
     ],
 )

@@ -21,7 +21,7 @@ from experiments.cases.store.store import Store
 from experiments.cases.workers.own import THIS_MACHINE
 from experiments.cases.workers.workers import Workers
 from experiments.io.errors import StudyError
-from experiments.measurement.states import Observed, observe
+from experiments.measurement.case_observables import Observed, observe
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import ANGLE

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from experiments.commands.console import clear_errors, fail, plain
 from experiments.commands.options import AsJson
 from experiments.commands.results import print_angles, print_findings
+
+if TYPE_CHECKING:
+    from experiments.measurement.photographs import PictureOptions
+    from imaging import View
 
 ANGLE_EXAMPLE = "Example: [bold]dem-warp angle photos/*.jpg --fit middle --overlay measured[/]"
 
@@ -20,8 +25,8 @@ def angle(
         list[Path],
         typer.Argument(
             metavar="PICTURE...",
-            help="Photographs of heaps; or heaps of LIGGGHTS, LAMMPS, Yade and others: text dumps (of which "
-            "the last frame), tables of spheres, VTK files.",
+            help="Photographs of heaps; or heaps of LIGGGHTS, LAMMPS, Yade and others: text dumps (the last "
+            "frame), tables of spheres, VTK files.",
         ),
     ],
     fit: Annotated[str, typer.Option(help="Part of the flanks: flank, middle, lower or upper.")] = "flank",
@@ -29,7 +34,8 @@ def angle(
         Path | None, typer.Option(metavar="DIR", help="Draw the fitted flanks on copies in this folder.")
     ] = None,
     by: Annotated[
-        str, typer.Option(help="Views of one heap: each picture another heap, or one heap a folder.")
+        Literal["picture", "folder"],
+        typer.Option(help="picture: one heap per picture; folder: one heap per folder."),
     ] = "picture",
     keep_doubtful: Annotated[bool, typer.Option(help="Count doubtful pictures in the mean.")] = False,
     crop: Annotated[str | None, typer.Option(metavar="X1,Y1,X2,Y2", help="Look at this part only.")] = None,
@@ -38,18 +44,23 @@ def angle(
         typer.Option(metavar="X1,Y1,X2,Y2", help="Two points (pixels) where heap and plate meet."),
     ] = None,
     heap_number: Annotated[
-        int | None, typer.Option("--heap", help="Which of several, from the left.")
+        int | None, typer.Option("--heap", help="Number of the heap from the left, where there are several.")
     ] = None,
     elevation: Annotated[
         float | None, typer.Option(help="Angle at which the camera looks down, in degrees.")
     ] = None,
-    distance: Annotated[float | None, typer.Option(help="Camera to heap, in widths of the heap.")] = None,
+    distance: Annotated[
+        float | None, typer.Option(help="Distance of the camera from the heap, in widths of the heap.")
+    ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="Unit of length in files of spheres. Left out: what they name, or m.")
+        str | None, typer.Option(help="Unit of length in files of spheres. Default: the file's own, or m.")
     ] = None,
     plate_height: Annotated[
         str | None,
-        typer.Option(metavar="LENGTH", help='Plate of files of spheres, as "2 mm". Left out: it is found.'),
+        typer.Option(
+            metavar="LENGTH",
+            help='Plate height in files of spheres, e.g. "2 mm". Default: found.',
+        ),
     ] = None,
     as_target: Annotated[bool, typer.Option("--target", help="Print a study's \\[target] section.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print the rows as CSV.")] = False,
@@ -57,40 +68,86 @@ def angle(
 ) -> None:
     """Measure repose angles on photographs, and on simulated heaps of other codes.
 
-    How to take them:
+    How to take photographs:
 
-    - the phone level, as high as the heap's middle, five heap widths away or more (zoom in);
+    - hold the phone level, as high as the heap's middle, five heap widths away or more (zoom in);
 
-    - a plain wall behind that differs from the grains; soft light, no hard shadow;
+    - use a plain wall that differs from the grains, and soft light without hard shadows;
 
-    - the whole heap with its foot, half the picture wide, the plate seen on both sides of it;
+    - show the whole heap with its foot, half the picture wide, and the plate on both sides of it;
 
-    - nothing else in view: no tube, ruler, label or second heap (--crop cuts them off).
+    - show nothing else: no tube, ruler, label or second heap (--crop cuts them off).
 
     Doubtful angles are marked, with the reason, and left out of the mean. Pictures in HEIC need
-    pip install 'dem-warp\\[heic]', or to be saved as JPEG. Heaps of spheres are seen from eight sides.
+    pip install 'dem-warp\\[heic]', or must be saved as JPEG. Heaps of spheres are viewed from eight sides.
     """
     with clear_errors():
         from experiments.measurement import photographs
         from experiments.measurement.heap_files import heap_settings
 
-        photographs.require_one_form({"--target": as_target, "--csv": as_csv, "--json": as_json})
-        view = photographs.view_of(crop, plate, heap_number, elevation, distance)
-        heaps = heap_settings(unit, plate_height)
-        grouping = photographs.grouping_of(by)
-        rows = photographs.measure_pictures(pictures, fit, overlay, view, heaps)
-        mean = photographs.mean_angle(rows, grouping, keep_doubtful)
+        _require_one_form({"--target": as_target, "--csv": as_csv, "--json": as_json})
+        view, heaps = _view(crop, plate, heap_number, elevation, distance), heap_settings(unit, plate_height)
+        options = photographs.PictureOptions(fit, view, heaps, by, keep_doubtful)
         if as_target:
-            typer.echo(photographs.target_section(mean, fit, rows, grouping), nl=False)
+            photographs.require_separate(pictures, options, "--target")
+        rows = photographs.measure_pictures(pictures, options, overlay)
+        if as_target:
+            typer.echo(photographs.target_text(rows, options), nl=False)
         elif as_csv:
             typer.echo(plain(photographs.csv_table(rows)), nl=False)
-        elif as_json:
-            result = {"pictures": rows, "mean": mean.to_dict() if mean else None}
-            typer.echo(json.dumps(result, allow_nan=False))
         else:
-            print_angles(rows, fit)
-            if mean:
-                typer.echo(str(mean))
+            _print_mean(rows, options, as_json)
     print_findings(rows)
     if rejected := [row["reason"] for row in rows if row["reason"]]:
         fail("\n".join(rejected))
+
+
+def _print_mean(rows: Sequence[Mapping[str, Any]], options: PictureOptions, as_json: bool) -> None:
+    from experiments.measurement.photographs import mean_angle
+
+    mean = mean_angle(rows, options)
+    if as_json:
+        result = {"pictures": rows, "mean": mean.to_dict() if mean else None}
+        typer.echo(json.dumps(result, allow_nan=False))
+        return
+    print_angles(rows, options.fit)
+    if mean:
+        typer.echo(str(mean))
+
+
+def _require_one_form(chosen: Mapping[str, bool]) -> None:
+    """Refuse two forms of the output at once, given by their options."""
+    from experiments.io.errors import InputError
+
+    given = [option for option, wanted in chosen.items() if wanted]
+    if len(given) > 1:
+        *others, last = chosen
+        problem = f"only one of {', '.join(others)} and {last} is possible"
+        raise InputError(given[1], problem, " ".join(given), "Each is the whole output.")
+
+
+def _view(
+    crop: str | None, plate: str | None, heap: int | None, elevation: float | None, distance: float | None
+) -> View:
+    from experiments.io.errors import InputError
+    from imaging import View
+
+    corners = _four_numbers(crop, "--crop")
+    if corners is not None and any(value != int(value) for value in corners):
+        raise InputError("--crop", "must be whole pixels X1,Y1,X2,Y2", crop)
+    part = None if corners is None else (int(corners[0]), int(corners[1]), int(corners[2]), int(corners[3]))
+    return View(part, _four_numbers(plate, "--plate"), heap, elevation, distance)
+
+
+def _four_numbers(text: str | None, option: str) -> tuple[float, float, float, float] | None:
+    from experiments.io.errors import InputError
+
+    if text is None:
+        return None
+    try:
+        x1, y1, x2, y2 = (float(part) for part in text.split(","))
+    except ValueError:
+        x1 = y1 = x2 = y2 = float("nan")
+    if not all(abs(number) < float("inf") for number in (x1, y1, x2, y2)):
+        raise InputError(option, "must be four numbers X1,Y1,X2,Y2", text)
+    return x1, y1, x2, y2

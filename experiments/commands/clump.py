@@ -14,7 +14,7 @@ from experiments.commands.results import print_clump, print_trial
 from experiments.io.units import read_quantity, read_share
 
 if TYPE_CHECKING:
-    from experiments.grains.clumps.shapes import Clump
+    from experiments.grains.clumps.clump_maker import Clump
 
 CLUMP_EXAMPLE = "Example: [bold]dem-warp clump tri-pyramid:5.90x3.93 --spheres 9 --out clump.txt[/]"
 
@@ -26,7 +26,7 @@ def clump(
             metavar="SHAPE",
             help="A mesh file in mm; a solid by its dimensions in mm (sphere:D, ellipsoid:LxWxT, "
             "cylinder:LxD, capsule:LxD, tri-pyramid:HxEDGE); or a file of spheres of dem-warp, LIGGGHTS, "
-            "Yade, EDEM or DEM-Engine, to be described.",
+            "Yade, EDEM or DEM-Engine, to describe.",
         ),
     ],
     spheres: Annotated[
@@ -36,32 +36,33 @@ def clump(
         str | None,
         typer.Option(
             metavar="PERCENT",
-            help="Instead: the least spheres whose volume, inertia and surface are within it, as 5%.",
+            help="Use the fewest spheres that keep all three errors (volume, inertia, surface) below this, "
+            "e.g. 5%.",
         ),
     ] = None,
     unit: Annotated[
         str | None,
-        typer.Option(help='Unit of a file, as m, or the length that is 1 in it, as "2.5 mm". Left out: mm.'),
+        typer.Option(help='Unit of a file, e.g. m, or the length of 1 in it, e.g. "2.5 mm". Default: mm.'),
     ] = None,
     protrusion: Annotated[
         str | None,
         typer.Option(
-            help="How far a sphere may pass the surface; auto: until the volume is the solid's. Left out: "
-            "0 mm, and auto with --tolerance."
+            help="How far a sphere may pass the surface; auto: until the volume is the solid's. Default: "
+            "0 mm, or auto with --tolerance."
         ),
     ] = None,
-    density: Annotated[str | None, typer.Option(help='For the mass, as "698 kg/m^3".')] = None,
+    density: Annotated[str | None, typer.Option(help='Density for the mass, e.g. "698 kg/m^3".')] = None,
     out: Annotated[
         Path | None, typer.Option(help="File of spheres to write, for a study's grain.clump.")
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the clump beside the solid, as a .png.")
+        Path | None, typer.Option(metavar="FILE", help="Draw the clump and the solid, e.g. to a .png.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Make a grain of spheres from a mesh or measured dimensions: volume, mass, inertia, spheres."""
     with clear_errors():
-        from experiments.grains.clumps.shapes import ClumpRequest, make_clump, write_clump
+        from experiments.grains.clumps.clump_maker import ClumpRequest, make_clump, write_clump
 
         _require_new(out, picture)
         request = ClumpRequest(
@@ -83,7 +84,7 @@ def clump(
 
 
 def _require_new(out: Path | None, picture: Path | None) -> None:
-    """Refuse what cannot be written before anything is fitted."""
+    """Refuse files that cannot be written before anything is fitted."""
     from experiments.grains.clumps.clump_picture import require_picture
     from experiments.io.files import require_new_file
 
@@ -94,9 +95,9 @@ def _require_new(out: Path | None, picture: Path | None) -> None:
 
 
 def _print_remarks(made: Clump, source: str) -> None:
-    """Say how a file was read, and what may be done about a poor fit."""
-    if made.told:
-        messages.print(f"Read: {source}: {made.told}")
+    """Print how a file was read, and advice about a poor fit."""
+    if made.description:
+        messages.print(f"Read: {source}: {made.description}")
     if made.doubt:
         messages.print(f"Doubtful: {made.doubt}")
     if made.advice:

@@ -24,7 +24,7 @@ def new(
     """Write a commented study file to start from, or a file for the measured heaps of a study."""
     with clear_errors():
         if measured:
-            from experiments.measurement.template import write_measured_template
+            from experiments.measurement.measured_template import write_measured_template
             from experiments.studyfile import load_study
 
             study = Path(name) if name.endswith(".toml") else Path(f"{name}.toml")

@@ -73,10 +73,10 @@ def print_measured(simulated: Heap) -> None:
         value = simulated.observed.observables[name]
         typer.echo(f"{name.replace('_', ' ')}: {value:.5g} {'' if unit == '1' else unit}".rstrip())
     if simulated.filling is not None:
-        from experiments.measurement.filling import filling_told
+        from experiments.measurement.filling import filling_text
 
         scene = simulated.study.case(simulated.settings, simulated.seed, simulated.scene).scene
-        typer.echo(f"filling: {filling_told(scene, simulated.filling)}")
+        typer.echo(f"filling: {filling_text(scene, simulated.filling)}")
 
 
 def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:

@@ -14,7 +14,7 @@ from experiments.cases.engines.engine import NO_ANSWER
 from experiments.cases.measuring import measuring_processes
 from experiments.cases.store.outcome_table import Outcome, OutcomeTable
 from experiments.cases.workers.own import THIS_MACHINE
-from experiments.measurement.states import measure
+from experiments.measurement.case_observables import measure
 from experiments.studyfile.observables import NAMES
 from experiments.studyfile.study import MeasurementSection
 

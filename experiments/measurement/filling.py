@@ -1,8 +1,7 @@
-"""Filling of a drum as it was reached, against the one that a study states.
+"""Reached filling of a drum, compared with the filling of the study.
 
-Grains stop falling when the drum is as full as a look at its surface tells, and a level bed is struck off at
-the height that the stated filling has: the bed ends lower at its sides, or higher by the grains that were
-still falling (`experiments/evidence/performance/fillings.py` has the size of both).
+The filling stops by the height of the bed's surface, and a level bed is cut at the height of the study's
+filling. So the bed ends lower at its sides, or higher by the grains that were still falling.
 """
 
 from __future__ import annotations
@@ -13,18 +12,13 @@ from typing import Any
 from dem_warp import Drum
 
 TOLERANCE = 0.02
-"""Part of a drum's volume by which its filling may miss the stated one without a word."""
+"""Deviation of a filling without a caution, as a part of the drum's volume."""
 
 
 def filling_reached(scene: Any, observables: Mapping[str, float]) -> float | None:
-    """Part of a drum's volume below its bed's surface, before it turned; None where it is not known.
+    """Return the part of a drum's volume below its bed's surface, before it turned; None where it is unknown.
 
-    Parameters
-    ----------
-    scene
-        Scene of the case; anything but a drum has no filling.
-    observables
-        Observables of the case in SI, of which `fill_height` counts.
+    It follows from `fill_height` among the observables [m]; only a drum has a filling.
     """
     height = observables.get("fill_height")
     if not isinstance(scene, Drum) or height is None:
@@ -32,12 +26,12 @@ def filling_reached(scene: Any, observables: Mapping[str, float]) -> float | Non
     return scene.volume_below(height) / scene.volume_below(scene.diameter)
 
 
-def filling_told(scene: Drum, reached: float) -> str:
-    """Say what was reached, and, where the grains were not counted, what was stated."""
-    told = f"{reached:.2f} of the drum"
-    return told if scene.grain_count is not None else f"{told}, {scene.filling:g} stated"
+def filling_text(scene: Drum, reached: float) -> str:
+    """Write the reached filling, with that of the study where this has no number of grains."""
+    text = f"{reached:.2f} of the drum"
+    return text if scene.grain_count is not None else f"{text}, {scene.filling:g} in the study"
 
 
 def filling_missed(scene: Drum, reached: float) -> bool:
-    """Tell that a drum was filled otherwise than stated; counted grains fill what they fill."""
+    """Return True if the filling deviates from the study's, which gives no number of grains."""
     return scene.grain_count is None and abs(reached - scene.filling) > TOLERANCE

@@ -1,4 +1,4 @@
-"""Heaps of other codes to repose angles, by the code that measures dem-warp's own."""
+"""Repose angles of heaps of other codes, measured like dem-warp's own."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from imaging.geometry import Picture, Spheres
 from imaging.photo.doubts import GREATEST_ANGLE, LEAST_ANGLE, ROUGH_EDGE
 
 DEFAULT_UNIT = "m"
-"""Unit of a heap's file that names none; angles do not depend on it."""
+"""Unit of a heap's file without a unit; angles do not depend on it."""
 BELOW = 0.5
-"""Depth under the plate, in radii, from which a sphere has fallen off it."""
+"""Depth under the plate, in radii, of a sphere that fell off it."""
 
 
 @dataclass(frozen=True)
 class HeapSettings:
-    """Facts known of the files of heaps beforehand."""
+    """Known facts of the files of heaps."""
 
     unit: float | None = None
-    """Unit of length [m]; None: the one that a file names, or metres."""
+    """Unit of length [m]; None: the file's own, or metres."""
     plate_height: float | None = None
     """Height of the plate [m]; None: it is found."""
 
@@ -40,27 +40,20 @@ class MeasuredHeap:
     """A heap of a file, and its angle."""
 
     angle: HeapAngle
-    """The angle."""
-    told: str
-    """Format of the file, and what was measured of it."""
+    source: str
+    """Format of the file, and the measured part of it."""
     spheres: Spheres
     """Spheres [m] on the plate z = 0."""
 
     def pictures(self) -> tuple[Picture, Picture]:
-        """Draw the heap with the flanks fitted in its first view, and without."""
+        """Draw the heap with the fitted flanks of its first view, and without."""
         pixels, azimuth = MeasurementSection().pixels, self.angle.azimuths[0]
         clean = snapshot(self.spheres.centers, self.spheres.radii, azimuth=azimuth, pixels=pixels)
         return overlay(clean, self.angle.views[0]), clean.image
 
 
 def heap_settings(unit: str | None, plate_height: str | None) -> HeapSettings:
-    """Read what a person says of the files.
-
-    Raises
-    ------
-    InputError
-        When the unit is no unit of length, or the height no length.
-    """
+    """Read the options of files of heaps; raise `InputError` for an invalid unit or height."""
     try:
         size = None if unit is None else length_unit(unit)
     except ValueError as error:
@@ -74,7 +67,7 @@ def heap_settings(unit: str | None, plate_height: str | None) -> HeapSettings:
 
 @lru_cache(maxsize=1024)
 def is_heap_file(path: Path) -> bool:
-    """Tell by its content that a file holds spheres, and is no picture; one that is not there is none."""
+    """Return True if the content of a file is spheres; False for a picture or a missing file."""
     return path.is_file() and format_of(path) is not None
 
 
@@ -84,37 +77,33 @@ def measure_heap_file(path: Path, fit: str, settings: HeapSettings) -> MeasuredH
     Raises
     ------
     InputError
-        When the file breaks a rule of its format.
+        When the file is invalid.
     imaging.PictureError
-        When it holds no measurable heap.
+        When it has no measurable heap.
     """
     file = read_spheres(path)
     if settings.unit is not None and file.unit is not None and settings.unit != file.unit:
-        rule = "expected the unit given is that which the file names"
-        raise InputError(f"{path}, --unit", rule, f"{settings.unit:g} m for {file.unit:g} m")
+        problem = f"must be the unit of the file, {file.unit:g} m"
+        raise InputError(f"{path}, --unit", problem, f"{settings.unit:g} m")
     size = settings.unit or file.unit or length_unit(DEFAULT_UNIT)
     spheres = Spheres.of(file.spheres[:, :3] * size, file.spheres[:, 3] * size)
     height = find_ground(spheres) if settings.plate_height is None else settings.plate_height
     standing = spheres.centers[:, 2] > height - BELOW * spheres.radii
     if not standing.any():
-        raise InputError(
-            f"{path}, --plate-height",
-            "expected spheres stand on the plate",
-            f"none above {1e3 * height:g} mm",
-        )
+        raise InputError(f"{path}, --plate-height", "no sphere is above the plate", f"{1e3 * height:g} mm")
     heap = Spheres(spheres.centers[standing] - np.array([0.0, 0.0, height]), spheres.radii[standing])
     settled = MeasurementSection()
     bodies = len(heap.radii) if file.bodies is None else len(np.unique(file.bodies[standing]))
     angle = heap_angle(heap.centers, heap.radii, settled.azimuths, fit, settled.pixels, grain_count=bodies)
-    said = [
-        file.told,
+    parts = [
+        file.description,
         f"{len(heap.radii)} spheres of {_span(heap.radii)} radius"
         + ("" if file.bodies is None else f" in {bodies} grains"),
         f"plate {'found' if settings.plate_height is None else 'given'} at {1e3 * height:.4g} mm",
     ]
     if fallen := int(np.count_nonzero(~standing)):
-        said.append(f"{fallen} below it left out")
-    return MeasuredHeap(angle, "; ".join(said), heap)
+        parts.append(f"{fallen} below it left out")
+    return MeasuredHeap(angle, "; ".join(parts), heap)
 
 
 def _span(radii: np.ndarray) -> str:
@@ -123,7 +112,7 @@ def _span(radii: np.ndarray) -> str:
 
 
 def values_of(heap: MeasuredHeap, level: float) -> dict[str, Any]:
-    """Values of a heap's row: flanks are means over its views, and what only a camera has is left out."""
+    """Return the values of a heap's row, without those of a camera; flanks are means over its views."""
     low, high = heap.angle.interval(level)
     views = heap.angle.views
     return {
@@ -133,13 +122,12 @@ def values_of(heap: MeasuredHeap, level: float) -> dict[str, Any]:
         "se": heap.angle.se,
         "low": low,
         "high": high,
-        "source": heap.told,
+        "source": heap.source,
         "doubts": [str(doubt) for doubt in _doubts(heap.angle)],
     }
 
 
 def _doubts(angle: HeapAngle) -> Iterator[Doubt]:
-    """Reasons to doubt an angle that need no camera."""
     if not LEAST_ANGLE <= angle.mean <= GREATEST_ANGLE:
         yield Doubt("range", f"{angle.mean:.1f} degrees, outside {LEAST_ANGLE:g} to {GREATEST_ANGLE:g}")
     if angle.se > ROUGH_EDGE:

@@ -1,23 +1,27 @@
-"""Pictures and files of heaps to repose angles, and these to the target of a calibration."""
+"""Pictures and files of heaps to repose angles, their mean over heaps, and the target of a study."""
 
 from __future__ import annotations
 
 import csv
 import io
+import os
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
+from glob import glob
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy import special
 
+from doe import Sample
 from experiments.io.errors import InputError
 from experiments.io.files import replacing
-from experiments.measurement.copies import Repeats
+from experiments.measurement.duplicates import Duplicates
 from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file, values_of
+from experiments.studyfile.target_section import Grouping
 from imaging import (
     FitSettings,
     PictureError,
@@ -30,108 +34,93 @@ from imaging import (
 )
 from imaging.geometry import Picture
 
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".heic", ".heif")
+"""Endings of the pictures in a folder."""
 LEVEL = 0.95
-"""Of all intervals."""
-Grouping = Literal["picture", "folder"]
+"""Confidence level of all intervals."""
 ROW_VALUES = (
     "left", "right", "mean", "se", "low", "high", "tilt", "elevation", "distance", "plate", "heap_pixels",
 )  # fmt: skip
 """Measured values of a row."""
 NOT_IN_NAMES = str.maketrans("", "", '/\\:*?"<>|')
-"""Characters that no file's name has on every system."""
+"""Characters that some systems do not allow in file names."""
+
+Row = dict[str, Any]
+"""Measurement of one picture, see `measure_pictures`."""
 
 
-def view_of(
-    crop: str | None,
-    plate: str | None,
-    heap: int | None,
-    elevation: float | None,
-    distance: float | None,
-) -> View:
-    """Read what a person says of the pictures.
+@dataclass(frozen=True)
+class PictureOptions:
+    """Options of the measurement of pictures and of their mean."""
 
-    Raises
-    ------
-    InputError
-        When a list is not of four numbers.
-    imaging.PictureError
-        When a number breaks its rule.
-    """
-    corners = _four(crop, "--crop")
-    if corners is not None and any(value != int(value) for value in corners):
-        raise InputError("--crop", "expected X1,Y1,X2,Y2 are whole pixels", crop)
-    part = None if corners is None else (int(corners[0]), int(corners[1]), int(corners[2]), int(corners[3]))
-    return View(part, _four(plate, "--plate"), heap, elevation, distance)
+    fit: str = "flank"
+    """Name of a fit, one of ``imaging.FITS``."""
+    view: View = field(default_factory=View)
+    """Known facts of every picture."""
+    heaps: HeapSettings = field(default_factory=HeapSettings)
+    """Known facts of every file of spheres."""
+    by: Grouping = "picture"
+    """Pictures of one heap: each picture is another heap, or each folder is one heap."""
+    keep_doubtful: bool = False
+    """True: doubtful pictures count in the mean."""
+
+    def heap_of(self, picture: Path, number: int) -> Hashable:
+        """Return the heap that a picture shows, given its number."""
+        return picture.parent if self.by == "folder" else number
 
 
-def _four(text: str | None, option: str) -> tuple[float, float, float, float] | None:
-    if text is None:
-        return None
-    try:
-        x1, y1, x2, y2 = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(option, "expected four numbers X1,Y1,X2,Y2", text) from None
-    if not np.isfinite([x1, y1, x2, y2]).all():
-        raise InputError(option, "expected four finite numbers X1,Y1,X2,Y2", text)
-    return x1, y1, x2, y2
-
-
-def require_one_form(chosen: Mapping[str, bool]) -> None:
-    """Refuse two forms of the result at once, by their options; each takes the whole standard output.
+def find_pictures(pattern: str, folder: Path, place: str, by: Grouping = "picture") -> list[Path]:
+    """Find the pictures of a folder, or of a pattern like ``photos/*.jpg``, relative to ``folder``.
 
     Raises
     ------
     InputError
-        With the options that were given.
+        When there are fewer than two.
     """
-    given = [option for option, wanted in chosen.items() if wanted]
-    if len(given) > 1:
-        *others, last = chosen
-        rule = f"only one of {', '.join(others)} and {last}: each is the whole output"
-        raise InputError(given[1], rule, " ".join(given))
+    named = folder / pattern
+    if os.path.isdir(named):  # unlike Path.is_dir, it accepts names that are too long
+        inner = named.rglob("*") if by == "folder" else named.iterdir()
+        found = sorted(path for path in inner if path.suffix.lower() in SUFFIXES)
+    else:
+        found = sorted(map(Path, glob(str(named))))
+    if len(found) < 2:
+        raise InputError(place, f"needs at least two pictures of heaps ({len(found)} at {named})", pattern)
+    return found
 
 
-def grouping_of(by: str) -> Grouping:
-    """Read which pictures show one heap; raise `InputError` on anything but picture or folder."""
-    if by == "picture":
-        return "picture"
-    if by == "folder":
-        return "folder"
-    raise InputError("--by", "is picture or folder", by)
+def require_separate(pictures: Sequence[Path], options: PictureOptions, place: str) -> None:
+    """Refuse pictures of different heaps with the same content; raise `InputError` with both."""
+    given = Duplicates()
+    for number, picture in enumerate(pictures, start=1):
+        if picture.is_file():
+            heap = options.heap_of(picture, number)
+            given.add_file(picture, heap, str(picture), f"{place}: picture {number}")
 
 
 def measure_pictures(
-    pictures: Sequence[Path],
-    fit: str = "flank",
-    overlay_folder: Path | None = None,
-    view: View | None = None,
-    heaps: HeapSettings | None = None,
-) -> list[dict[str, Any]]:
-    """Measure the repose angle of each picture; one that cannot be measured costs the others nothing.
+    pictures: Sequence[Path], options: PictureOptions | None = None, overlay_folder: Path | None = None
+) -> list[Row]:
+    """Measure the repose angle of each picture; a failed one does not affect the others.
 
     Parameters
     ----------
     pictures
-        Picture files, and files of spheres that hold a heap of LIGGGHTS, LAMMPS, Yade or another code.
-    fit
-        Name of a fit, one of ``imaging.FITS``.
+        Picture files, and files of spheres with a heap of LIGGGHTS, LAMMPS, Yade or another code.
+    options
+        Options of the measurement.
     overlay_folder
-        Where copies with the fitted flanks are drawn: ``NAME-angle.png`` for each picture, with its folder's
-        name before where two have one name; of a file of spheres also ``NAME-angle-clean.png``, without them.
-    view
-        What is known of every picture beforehand.
-    heaps
-        What is known of every file of spheres beforehand.
+        Folder for copies with the fitted flanks: ``NAME-angle.png`` for each picture, with its folder's name
+        where two have one name; for a file of spheres also ``NAME-angle-clean.png``, without the flanks.
 
     Returns
     -------
     list of dict
-        For each picture: ``picture``, ``source`` (photograph, or the format of a heap's file and what was
-        taken from it), ``fit``, ``left``, ``right``, ``mean``, ``se``, the ends ``low`` and
-        ``high`` of the 95 % interval, ``tilt`` and ``elevation`` of the camera [degrees], its ``distance``
-        [heap widths] where it is known, the ``plate``'s line (x1, y1, x2, y2) and the heap's width
-        ``heap_pixels`` [pixels], all None where it could not be measured; ``doubts``, a list of sentences;
-        ``overlay``, the drawn copy or None; ``reason``, empty where it could be measured and drawn.
+        For each picture: ``picture``, ``source`` (photograph, or the format of a heap's file and the part of
+        it that was used), ``fit``, ``left``, ``right``, ``mean``, ``se``, the ends ``low`` and ``high`` of
+        the 95 % interval, ``tilt`` and ``elevation`` of the camera [degrees], its ``distance`` [heap widths]
+        where it is known, the ``plate``'s line (x1, y1, x2, y2) and the heap's width ``heap_pixels``
+        [pixels], all None for a failed one; ``doubts``, a list of sentences; ``overlay``, the drawn copy or
+        None; ``reason`` of a failure, else empty.
 
     Raises
     ------
@@ -140,78 +129,56 @@ def measure_pictures(
     imaging.PictureError
         When there is no such fit.
     """
-    FitSettings.of(fit)
+    options = options or PictureOptions()
+    FitSettings.of(options.fit)
     if overlay_folder and any(folder.is_file() for folder in (overlay_folder, *overlay_folder.parents)):
-        raise InputError("--overlay", "expected copies are drawn in a folder", f"the file {overlay_folder}")
+        raise InputError("--overlay", "must be a folder, not a file", str(overlay_folder))
     names = drawn_names(pictures)
-    rows = []
-    for picture, name in zip(pictures, names, strict=True):
-        row: dict[str, Any] = {"picture": str(picture), "source": "photograph", "fit": fit}
-        row |= dict.fromkeys(ROW_VALUES)
-        row |= {"doubts": [], "overlay": None, "reason": ""}
-        rows.append(row)
-        # A picture may break a decoder, memory or a fit in ways that nobody thought of: it is a row, no end.
-        try:
-            if is_heap_file(picture):
-                row["source"] = "file of spheres"
-                heap = measure_heap_file(picture, fit, heaps or HeapSettings())
-                row |= values_of(heap, LEVEL)
-                drawn: Callable[[], tuple[Picture, ...]] = heap.pictures
-            else:
-                angle = measure_photograph(picture, fit, view)
-                row |= _values(angle)
-                drawn = partial(_drawn_photograph, picture, angle)
-            if overlay_folder:
-                clean = f"{Path(name).stem}-clean.png"
-                for kept, drawing in zip((name, clean), drawn(), strict=False):
-                    with replacing(overlay_folder / kept) as temporary:
-                        save_picture(temporary, drawing)
-                row["overlay"] = str(overlay_folder / name)
-        except (PictureError, InputError) as error:
-            row["reason"] = str(error) if str(picture) in str(error) else f"{picture}: {error}"
-        except MemoryError:
-            row["reason"] = f"{picture}: expected: a picture that fits into memory, got one that does not"
-        except Exception as error:
-            task = "drawing" if row["mean"] is not None else "measuring"
-            row["reason"] = f"{picture}: {task} failed: {type(error).__name__}: {error}"
-    return rows
+    return [
+        _measured_row(picture, options, overlay_folder / name if overlay_folder else None)
+        for picture, name in zip(pictures, names, strict=True)
+    ]
+
+
+def _measured_row(picture: Path, options: PictureOptions, copy: Path | None) -> Row:
+    row: Row = {"picture": str(picture), "source": "photograph", "fit": options.fit}
+    row |= dict.fromkeys(ROW_VALUES)
+    row |= {"doubts": [], "overlay": None, "reason": ""}
+    # A picture may break a decoder, memory or a fit in unexpected ways: that is the reason of its row.
+    try:
+        if is_heap_file(picture):
+            row["source"] = "file of spheres"
+            heap = measure_heap_file(picture, options.fit, options.heaps)
+            row |= values_of(heap, LEVEL)
+            draw: Callable[[], tuple[Picture, ...]] = heap.pictures
+        else:
+            angle = measure_photograph(picture, options.fit, options.view)
+            row |= _values(angle)
+            draw = partial(_drawn_photograph, picture, angle)
+        if copy:
+            clean = copy.with_name(f"{copy.stem}-clean.png")
+            for path, drawing in zip((copy, clean), draw(), strict=False):
+                with replacing(path) as temporary:
+                    save_picture(temporary, drawing)
+            row["overlay"] = str(copy)
+    except (PictureError, InputError) as error:
+        row["reason"] = str(error) if str(picture) in str(error) else f"{picture}: {error}"
+    except MemoryError:
+        row["reason"] = f"{picture}: the picture does not fit into memory"
+    except Exception as error:
+        task = "drawing" if row["mean"] is not None else "measuring"
+        row["reason"] = f"{picture}: {task} failed: {type(error).__name__}: {error}"
+    return row
 
 
 def _drawn_photograph(picture: Path, angle: ReposeAngle) -> tuple[Picture]:
-    """Copy of a photograph with its flanks; the photograph itself is the one without."""
     return (overlay(read_picture(picture), angle),)
 
 
-def drawn_names(pictures: Sequence[Path]) -> list[str]:
-    """Names of the drawn copies: as short as they can be, and all different."""
-    names = [f"{picture.stem}-angle.png" for picture in pictures]
-    for depth in range(2, 2 + max((len(picture.parts) for picture in pictures), default=0)):
-        # as on systems whose names have no case, and without what no name there may have
-        count = Counter(name.casefold() for name in names)
-        names = [
-            "_".join((*picture.parts[-depth:-1], name_of(picture))).translate(NOT_IN_NAMES)
-            if count[name.casefold()] > 1
-            else name
-            for picture, name in zip(pictures, names, strict=True)
-        ]
-    seen: Counter[str] = Counter()
-    different = []
-    for name in names:
-        times = seen[name.casefold()] = seen[name.casefold()] + 1
-        different.append(name if times == 1 else f"{name.removesuffix('.png')}-{times}.png")
-    return different
-
-
-def name_of(picture: Path) -> str:
-    """Name of a picture's drawn copy, its ending told where another picture has the same stem."""
-    return f"{picture.name.replace('.', '-')}-angle.png"
-
-
-def _values(angle: ReposeAngle) -> dict[str, Any]:
+def _values(angle: ReposeAngle) -> Row:
     low, high = angle.interval(LEVEL)
     outline = angle.outline
-    ends = outline.position[[0, -1]]
-    columns, rows = outline.plate.picture_point(ends, np.zeros(2))
+    columns, rows = outline.plate.picture_point(outline.position[[0, -1]], np.zeros(2))
     return {
         "left": angle.left,
         "right": angle.right,
@@ -228,59 +195,69 @@ def _values(angle: ReposeAngle) -> dict[str, Any]:
     }
 
 
+def drawn_names(pictures: Sequence[Path]) -> list[str]:
+    """Return short and different names of the drawn copies."""
+    names = [f"{picture.stem}-angle.png" for picture in pictures]
+    for depth in range(2, 2 + max((len(picture.parts) for picture in pictures), default=0)):
+        # names may differ by case alone, which some systems ignore
+        count = Counter(name.casefold() for name in names)
+        names = [
+            "_".join((*picture.parts[-depth:-1], f"{picture.name.replace('.', '-')}-angle.png")).translate(
+                NOT_IN_NAMES
+            )
+            if count[name.casefold()] > 1
+            else name
+            for picture, name in zip(pictures, names, strict=True)
+        ]
+    seen: Counter[str] = Counter()
+    different = []
+    for name in names:
+        times = seen[name.casefold()] = seen[name.casefold()] + 1
+        different.append(name if times == 1 else f"{name.removesuffix('.png')}-{times}.png")
+    return different
+
+
 @dataclass(frozen=True)
 class MeanAngle:
     """Mean over heaps."""
 
     mean: float
-    """Mean over the heaps of each one's mean over its pictures [degrees]."""
+    """Mean over the heaps of each heap's mean over its pictures [degrees]."""
     sd: float | None
     """Standard deviation of one heap [degrees]; None with one heap."""
     n: int
-    """Heaps."""
+    """Number of heaps."""
     low: float | None
     high: float | None
     """Ends of the 95 % interval of the mean; None with one heap."""
     pictures: int
-    """Pictures that it holds."""
+    """Number of pictures in the mean."""
     left_out: tuple[str, ...]
-    """Measured pictures that are doubtful, and so left out."""
+    """Measured pictures that are left out because they are doubtful."""
 
     def __str__(self) -> str:
-        """Write the mean as a line for people."""
-        said = [f"mean {self.mean:.2f} degrees of {self.n} heap{'s' if self.n > 1 else ''}"]
+        parts = [f"mean {self.mean:.2f} degrees of {self.n} heap{'s' if self.n > 1 else ''}"]
         if self.sd is not None:
-            said.append(f"sd {self.sd:.2f}, 95 % interval {self.low:.2f} to {self.high:.2f}")
+            parts.append(f"sd {self.sd:.2f}, 95 % interval {self.low:.2f} to {self.high:.2f}")
         if self.left_out:
-            said.append(f"{len(self.left_out)} doubtful left out")
-        return "; ".join(said)
+            parts.append(f"{len(self.left_out)} doubtful left out")
+        return "; ".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
-        """Values for JSON."""
+        """Return the values for JSON."""
         return asdict(self)
 
 
-def mean_angle(
-    rows: Sequence[Mapping[str, Any]], by: Grouping = "picture", keep_doubtful: bool = False
-) -> MeanAngle | None:
-    """Average measured pictures over heaps; None where no picture is left.
-
-    Parameters
-    ----------
-    rows
-        From `measure_pictures`.
-    by
-        Whether every picture shows another heap, or those of one folder are views of one.
-    keep_doubtful
-        Whether doubtful pictures count.
-    """
+def mean_angle(rows: Sequence[Mapping[str, Any]], options: PictureOptions | None = None) -> MeanAngle | None:
+    """Average the rows of `measure_pictures` over heaps; None where no picture counts."""
+    options = options or PictureOptions()
     measured = [row for row in rows if row["mean"] is not None]
-    used = [row for row in measured if keep_doubtful or not row["doubts"]]
+    used = [row for row in measured if options.keep_doubtful or not row["doubts"]]
     if not used:
         return None
     heaps: dict[Hashable, list[float]] = {}
-    for index, row in enumerate(used):
-        heaps.setdefault(_heap(row, index, by), []).append(row["mean"])
+    for number, row in enumerate(used):
+        heaps.setdefault(options.heap_of(Path(row["picture"]), number), []).append(row["mean"])
     means = np.array([np.mean(views) for views in heaps.values()])
     left_out = tuple(row["picture"] for row in measured if row not in used)
     mean, n = float(means.mean()), len(means)
@@ -291,39 +268,42 @@ def mean_angle(
     return MeanAngle(mean, sd, n, mean - reach, mean + reach, len(used), left_out)
 
 
-def _require_separate_heaps(rows: Sequence[Mapping[str, Any]], by: Grouping) -> None:
-    """Refuse measured pictures, one of which is given for two heaps, to the byte."""
-    repeats = Repeats()
-    for index, row in enumerate(rows):
-        if row["mean"] is not None:
-            name = row["picture"]
-            repeats.add_file(Path(name), _heap(row, index, by), name, f"--target: picture {index + 1}")
-
-
-def _heap(row: Mapping[str, Any], index: int, by: Grouping) -> Hashable:
-    """Heap that a picture shows."""
-    return Path(row["picture"]).parent if by == "folder" else index
-
-
-def target_section(
-    mean: MeanAngle | None, fit: str, rows: Sequence[Mapping[str, Any]], by: Grouping = "picture"
-) -> str:
-    """Write the ``[target]`` section of a study file, of the mean of rows.
+def target_sample(rows: Sequence[Mapping[str, Any]], options: PictureOptions, place: str) -> Sample:
+    """Return the sample of heaps that a target is made of.
 
     Raises
     ------
     InputError
-        When there are not two heaps: a target has a standard deviation. When a picture is given for two.
+        When there are fewer than two heaps; it has the reason of every picture that does not count.
     """
-    _require_separate_heaps(rows, by)
+    mean = mean_angle(rows, options)
     if mean is None or mean.sd is None:
-        received = f"{mean.n if mean else 0} (doubtful pictures count with --keep-doubtful)"
-        raise InputError("--target", "a target needs two measured heaps at the least", received)
+        problem = "; ".join(("needs two measured heaps at least", *left_out_notes(rows, options)))
+        hint = "To count doubtful pictures, use keep_doubtful (--keep-doubtful)."
+        raise InputError(place, problem, str(mean.n if mean else 0), hint)
+    return Sample(mean.mean, mean.sd, mean.n)
+
+
+def left_out_notes(rows: Sequence[Mapping[str, Any]], options: PictureOptions) -> tuple[str, ...]:
+    """Name the pictures that do not count, with their reasons."""
+    failed = [f"{row['reason']}; it is left out" for row in rows if row["mean"] is None]
+    doubtful = [
+        f"{Path(row['picture']).name} is doubtful, and left out: {'; '.join(row['doubts'])}"
+        for row in rows
+        if row["mean"] is not None and row["doubts"] and not options.keep_doubtful
+    ]
+    return (*doubtful, *failed)
+
+
+def target_text(rows: Sequence[Mapping[str, Any]], options: PictureOptions) -> str:
+    """Write the ``[target]`` section of a study file; raise `InputError` with fewer than two heaps."""
+    sample, mean = target_sample(rows, options, "--target"), mean_angle(rows, options)
+    used, left_out = (mean.pictures, len(mean.left_out)) if mean else (0, 0)
     return (
-        f"[target]  # {mean.pictures} photographs, {fit} fit; left out as doubtful: {len(mean.left_out)}\n"
-        f'mean = "{mean.mean:.3f} deg"\n'
-        f'sd = "{mean.sd:.3f} deg"\n'
-        f"n = {mean.n}\n"
+        f"[target]  # {used} photographs, {options.fit} fit; left out as doubtful: {left_out}\n"
+        f'mean = "{sample.mean:.3f} deg"\n'
+        f'sd = "{sample.sd:.3f} deg"\n'
+        f"n = {sample.n}\n"
     )
 
 

@@ -1,7 +1,7 @@
-"""Files of measured profiles: heights over distance of a drum's surface or a heap's outline, as a tidy CSV.
+"""Files of measured profiles: heights of a drum's surface or a heap's outline, as a tidy CSV.
 
-A row is a point, ``replicate, x, z`` with units, or, of a heap, ``replicate, picture, pixel``: a photograph,
-or a file of spheres of another code. The column ``view`` tells views of a heap, or frames of a drum, apart.
+A row is a point, ``replicate, x, z`` with units, or, for a heap, ``replicate, picture, pixel``: a photograph,
+or a file of spheres of another code. The column ``view`` numbers views of a heap, or frames of a drum.
 """
 
 from __future__ import annotations
@@ -17,44 +17,44 @@ from dem_warp.scenes.drum_surface import STATIONS
 from experiments.io.errors import InputError
 from experiments.io.rows import Row, read_rows
 from experiments.io.units import Quantity
-from experiments.measurement.copies import Repeats
-from experiments.measurement.plausible import SizeOfTest
+from experiments.measurement.duplicates import Duplicates
+from experiments.measurement.value_limits import ValueLimits
 from imaging import PictureError
 
 COLUMNS = ("replicate", "view", "x", "z", "picture", "pixel")
 """Columns of a file of profiles."""
 
 LEAST_STATIONS = 3
-"""Stations of a drum that all profiles must span."""
+"""Fewest stations of a drum that all profiles span."""
 
 WIDEST_GAP = 0.25
-"""Between two neighbouring points of a drum's profile, over its radius: the stations are 0.2 apart."""
+"""Largest gap between neighbouring points of a drum's profile, over its radius: stations are 0.2 apart."""
 
 MIRRORED = 5.0
-"""A drum's surface falls to the right; one that rises there by more than this is mirrored [deg]."""
+"""Rise to the right [deg] above which a drum's surface, which falls to the right, is mirrored."""
 
 LEAST_POINTS = 8
-"""Points of a heap's profile."""
+"""Fewest points of a heap's profile."""
 
 FOOT = 0.1
-"""A heap's profile ends lower than this part of its height."""
+"""Largest height of a profile's ends, as a part of the heap's height."""
 
 
 class Profiles(NamedTuple):
     """Measured profiles."""
 
     names: list[str]
-    """Replicate of each."""
+    """Replicate of each profile."""
     stations: list[int]
-    """Numbers of their places, from 0."""
+    """Numbers of the stations, from 0."""
     heights: np.ndarray
-    """Mean of the views of each [m], shape (profiles, stations)."""
+    """Mean over the views of each profile [m], shape (profiles, stations)."""
     views: list[np.ndarray]
-    """Views of each [m], shape (views, stations)."""
+    """Views of each profile [m], shape (views, stations)."""
 
 
 class _Points(NamedTuple):
-    """Points of one view, by place [m], and the line of its first row."""
+    """Heights of one view by place [m], and the line of its first row."""
 
     line: int
     heights: dict[float, float]
@@ -66,16 +66,15 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     Raises
     ------
     InputError
-        When the file cannot be read, a point lies outside the drum, the profiles span too few stations, or
-        one of them has a gap, is mirrored or is a copy of another.
+        When the file cannot be read, a point is outside the drum, the profiles span too few stations, or one
+        of them has a gap, is mirrored or is a copy of another.
     """
     found: dict[str, dict[str, _Points]] = {}
     for row in read_rows(path, ("replicate", "x", "z"), COLUMNS[:4]):
         x, z = _take_point(row, found)
         if np.hypot(x, z) > radius:
-            rule = f"must lie in the drum, within {1e3 * radius:g} mm of its axis"
-            value = f"x {row['x']}, z {row['z']}"
-            raise InputError(f"{path}:{row.line}: x, z", rule, value)
+            problem = f"must be in the drum, within {1e3 * radius:g} mm of its axis"
+            raise InputError(f"{path}:{row.line}: x, z", problem, f"x {row['x']}, z {row['z']}")
     _require_rows(found, path)
     places = np.array(STATIONS) * radius
     views = {name: [view.heights for view in each.values()] for name, each in found.items()}
@@ -83,8 +82,8 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     low, high = max(end[0] for end in ends), min(end[1] for end in ends)
     kept = [number for number, place in enumerate(places) if low <= place <= high]
     if len(kept) < LEAST_STATIONS:
-        told = f"{1e3 * low:.4g} to {1e3 * high:.4g} mm, {len(kept)} stations"
-        raise InputError(str(path), f"all profiles must span {LEAST_STATIONS} stations of the drum", told)
+        span = f"{1e3 * low:.4g} to {1e3 * high:.4g} mm, {len(kept)} stations"
+        raise InputError(str(path), f"all profiles must span {LEAST_STATIONS} stations of the drum", span)
     for each in found.values():
         for view in each.values():
             _check_surface(view, radius, f"{path}:{view.line}")
@@ -93,35 +92,41 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     return _profiles(kept, heights)
 
 
-def read_heap_profiles(path: Path, fit: str, size: SizeOfTest) -> Profiles:
-    """Read outlines of heaps at the places of `imaging.profile`, from points, pictures and files of spheres.
+def read_heap_profiles(path: Path, fit: str, size: ValueLimits) -> Profiles:
+    """Read outlines of heaps at the stations of `imaging.heap_profile`, from points, pictures and spheres.
 
-    Those of spheres have their flanks fitted by a ``fit``, which tells what is no heap. The ``size`` of the
-    test says how high a heap may be.
+    Parameters
+    ----------
+    path
+        The file.
+    fit
+        Fit of the flanks in pictures and files of spheres.
+    size
+        Limits of the heap's height.
 
     Raises
     ------
     InputError
-        When the file cannot be read, a picture shows no heap or one in doubt, a profile lacks a foot or is a
-        copy of another, or the test cannot give its height.
+        When the file cannot be read, a picture has no heap or a doubtful one, a profile lacks a foot or is a
+        copy of another, or its height is impossible.
     """
     points: dict[str, dict[str, _Points]] = {}
     heaps: dict[str, list[np.ndarray]] = {}
-    pictures = Repeats()
+    pictures = Duplicates()
     for row in read_rows(path, ("replicate",), COLUMNS):
         if row["picture"]:
             if row["x"] or row["z"]:
-                raise row.error("a row has a picture or a point, not both", "picture")
+                raise row.error("must not be in a row with a point", "picture")
             heaps.setdefault(_label(row), []).extend(_pictured(row, fit, size))
-            # views of one heap are pictures of their own, too
+            # views of one heap must be different pictures, too
             pictures.add_file(path.parent / row["picture"], row.line, row["picture"], row.place("picture"))
         else:
             _, z = _take_point(row, points)
             if z < 0.0:
-                raise row.error("must stand on the plate: z counts from it", "z")
+                raise row.error("must be 0 or more: the plate is z = 0", "z")
             heaps.setdefault(row["replicate"], [])
     for name, views in points.items():
-        heaps[name] += [_drawn(view, f"{path}:{view.line}", size) for view in views.values()]
+        heaps[name] += [_outline(view, f"{path}:{view.line}", size) for view in views.values()]
     _require_own_points(points, path)
     _require_rows(heaps, path)
     stations = list(range(len(next(iter(heaps.values()))[0])))
@@ -135,28 +140,28 @@ def _profiles(stations: list[int], found: Mapping[str, list[np.ndarray]]) -> Pro
 
 
 def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, float]:
-    """Put the point of a row with those of its view; return it."""
+    """Add the point of a row to those of its view, and return it."""
     x, z = _length(row, "x"), _length(row, "z")
     views = found.setdefault(_label(row), {})
     view = views.setdefault(row["view"], _Points(row.line, {}))
     if x in view.heights:
-        raise row.error("every place of a profile stands once", "x")
+        raise row.error("appears twice in the profile", "x")
     view.heights[x] = z
     return x, z
 
 
 def _require_rows(found: Sized, path: Path) -> None:
     if not found:
-        raise InputError(str(path), "needs rows below the names of the columns", "no rows")
+        raise InputError(str(path), "has no rows below the names of the columns")
 
 
 def _require_own_points(found: Mapping[str, Mapping[str, _Points]], path: Path) -> None:
     """Refuse a profile whose points are those of another replicate, to the last digit."""
-    repeats = Repeats()
+    given = Duplicates()
     for name, views in found.items():
         for view in views.values():
             points = tuple(sorted(view.heights.items()))
-            repeats.add(points, name, f"replicate {name}", f"{path}:{view.line}")
+            given.add(points, name, f"replicate {name}", f"{path}:{view.line}")
 
 
 def _label(row: Row) -> str:
@@ -171,74 +176,70 @@ def _between(view: Mapping[float, float], places: np.ndarray) -> np.ndarray:
 
 
 def _check_surface(view: _Points, radius: float, place: str) -> None:
-    """Refuse a profile of a drum that has a gap, or rises where it must fall."""
+    """Refuse a profile of a drum with a gap, or that rises where it must fall."""
     x = np.array(sorted(view.heights))
     z = np.array([view.heights[each] for each in x])
     widest = int(np.argmax(np.diff(x)))
     if x[widest + 1] - x[widest] > WIDEST_GAP * radius:
-        rule = f"expected a profile has no gap: points at most {1e3 * WIDEST_GAP * radius:.4g} mm apart in x"
-        told = f"none between {1e3 * x[widest]:.4g} and {1e3 * x[widest + 1]:.4g} mm"
-        raise InputError(f"{place}: x", rule, told)
+        problem = f"points must be at most {1e3 * WIDEST_GAP * radius:.4g} mm apart"
+        gap = f"none between {1e3 * x[widest]:.4g} and {1e3 * x[widest + 1]:.4g} mm"
+        raise InputError(f"{place}: x", problem, gap)
     rise = np.degrees(np.arctan(np.polyfit(x, z, 1)[0]))
     if rise > MIRRORED:
-        rule = "the surface must be high on the left and fall to the right, z up: mirror x, or turn z over"
-        raise InputError(f"{place}: x, z", rule, f"rises by {rise:.1f} deg")
+        problem = "the surface must be high on the left and fall to the right, z up"
+        raise InputError(f"{place}: x, z", problem, f"a rise of {rise:.1f} deg", "Mirror x, or negate z.")
 
 
-def _drawn(view: _Points, place: str, size: SizeOfTest) -> np.ndarray:
-    """Heights of an outline that points draw."""
+def _outline(view: _Points, place: str, size: ValueLimits) -> np.ndarray:
+    """Return the heights of an outline at its stations, from its points."""
     from imaging import profile_heights
 
     x = np.array(sorted(view.heights))
     z = np.array([view.heights[each] for each in x])
     if len(x) < LEAST_POINTS:
-        raise InputError(place, f"expected a heap's profile has {LEAST_POINTS} points or more", len(x))
+        raise InputError(place, f"a heap's profile needs {LEAST_POINTS} points or more", len(x))
     if max(z[0], z[-1]) > FOOT * z.max():
-        rule = (
-            f"expected a heap's profile goes from foot to foot: both ends lower than {FOOT:.0%} of its height"
-        )
+        problem = f"both ends of a heap's profile must be lower than {FOOT:.0%} of its height"
         ends = f"{1e3 * z[0]:.4g} and {1e3 * z[-1]:.4g} of {1e3 * z.max():.4g} mm"
-        raise InputError(place, rule, ends)
+        raise InputError(place, problem, ends)
     try:
         heights = profile_heights(x, z, place)
     except PictureError as error:
-        raise InputError(place, "expected a heap's profile has an area", "none") from error
-    size.require_height(float(z.max()), "is the unit right?", "", f"{place}: z")
+        raise InputError(place, "the heap's profile has no area") from error
+    size.require_height(float(z.max()), "Check the unit.", "", f"{place}: z")
     return heights
 
 
-def _pictured(row: Row, fit: str, size: SizeOfTest) -> Iterator[np.ndarray]:
-    """Heights of the outlines that a photograph, or a file of spheres from all around, shows."""
+def _pictured(row: Row, fit: str, size: ValueLimits) -> Iterator[np.ndarray]:
+    """Yield the heights of the outlines of a photograph, or of a file of spheres from all sides."""
     # a file of points needs no pictures
     from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file
     from imaging import find_outline, heap_profile, heap_shape, measure, read_picture
 
     path, place = row.file.parent / row["picture"], row.place("picture")
-    if not os.path.isfile(path):  # a name too long is none, and raises nothing
-        rule = f"must name a picture or a file of spheres, relative to this one (looked for {path})"
-        raise row.error(rule, "picture")
+    if not os.path.isfile(path):  # unlike Path.is_file, it accepts names that are too long
+        raise row.error(f"no such file: {path}", "picture")
     try:
         if is_heap_file(path):
             heap = measure_heap_file(path, fit, HeapSettings())
             height = max(heap_shape(view.outline).height for view in heap.angle.views)
-            size.require_height(height, "is its unit of length right?", f" in {row['picture']}", place)
+            size.require_height(height, "Check its unit of length.", f" in {row['picture']}", place)
             yield from (heap_profile(view.outline) for view in heap.angle.views)
             return
         if not row["pixel"]:
-            raise row.error("an outline in a picture needs the size of its pixels, as 0.1 mm", "pixel")
+            raise row.error("outlines in a picture need the size of its pixels, e.g. 0.1 mm", "pixel")
         pixel = _length(row, "pixel")
         if pixel <= 0.0:
-            raise row.error("must be greater than 0", "pixel")
+            raise row.error("must be positive", "pixel")
         seen = measure(find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path)), fit)
     except PictureError as error:
-        raise InputError(place, "must show a heap that can be measured", str(error)) from None
+        raise InputError(place, f"has no measurable heap: {error}") from None
     if seen.doubts:
-        rule = "must show a heap without a doubt: crop it, or leave the row out"
-        raise InputError(place, rule, "; ".join(map(str, seen.doubts)))
-    told = f" in {row['picture']}, with a pixel of {row['pixel']}"
-    question = "is the size of the pixels right?"
+        doubts = "; ".join(map(str, seen.doubts))
+        raise InputError(place, f"is doubtful: {doubts}", hint="Crop the picture, or remove the row.")
+    source = f" in {row['picture']}, with a pixel of {row['pixel']}"
     height = heap_shape(seen.outline).height
-    size.require_height(height, question, told, row.place("pixel"))
+    size.require_height(height, "Check the size of the pixels.", source, row.place("pixel"))
     yield heap_profile(seen.outline)
 
 

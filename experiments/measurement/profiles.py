@@ -10,8 +10,8 @@ from doe.curves.profile_sample import LEAST_PROFILES
 from doe.errors import RuleError
 from experiments.io.errors import InputError
 from experiments.io.units import Quantity
-from experiments.measurement.plausible import size_of_test
 from experiments.measurement.profile_files import Profiles, read_drum_profiles, read_heap_profiles
+from experiments.measurement.value_limits import limits_of_test
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import OUTLINE_PROFILE, PROFILES, SURFACE_PROFILE
@@ -71,7 +71,7 @@ def _made(study: Study, section: ResponseSection, place: str) -> list[ResponseSe
     if section.profiles is None and not twin:
         raise InputError(place, f'"{profile}" needs profiles, a file of them, or a twin', "neither")
     name = section.scene
-    shared = {"scene": name} if "scene" in section.model_fields_set else {}
+    shared: dict[str, Any] = {"scene": name} if "scene" in section.model_fields_set else {}
     shared["part_of"] = f"{profile}_{name}".replace("-", "_") if name != TARGET_SCENE else profile
     scene = study.case({}, 0, name).scene
     if (profile == SURFACE_PROFILE) != isinstance(scene, Drum) or not (
@@ -85,7 +85,7 @@ def _made(study: Study, section: ResponseSection, place: str) -> list[ResponseSe
     if isinstance(scene, Drum):
         found = read_drum_profiles(path, scene.diameter / 2)
     else:
-        found = read_heap_profiles(path, study.measurement.fit, size_of_test(study, name))
+        found = read_heap_profiles(path, study.measurement.fit, limits_of_test(study, name))
     if len(found.names) < LEAST_PROFILES:
         rule = f"needs profiles of {LEAST_PROFILES} repeats or more, each with a replicate of its own"
         raise InputError(f"{path}: replicate", rule, f"{len(found.names)}: {', '.join(found.names)}")

@@ -14,9 +14,8 @@ from experiments.io.errors import InputError, Problem
 from experiments.io.rows import Row
 from experiments.io.texts import nearest_name
 from experiments.io.units import Quantity
-from experiments.measurement.pictures import require_same_fit
-from experiments.measurement.plausible import SizeOfTest
 from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
+from experiments.measurement.value_limits import ValueLimits
 from experiments.studyfile.observables import (
     DIMENSIONS,
     OUTLINE_PROFILE,
@@ -25,14 +24,16 @@ from experiments.studyfile.observables import (
     Observable,
     View,
 )
+from imaging import FITS
 
 if TYPE_CHECKING:
     from imaging import Outline, PictureError
 
 CLOGGED = "the tube clogged"
-"""Reason of a replicate that left no heap because the grains stayed in the tube."""
+"""Reason of a replicate without a heap because the grains stayed in the tube."""
 CLOGGED_ROW = "clogged"
-"""Stands for an observable where the tube held its grains."""
+"""Observable of a row for such a replicate."""
+PIXEL_RULE = "lengths in a picture need the size of its pixels, e.g. 0.1 mm"
 
 
 @dataclass(frozen=True)
@@ -40,31 +41,24 @@ class Reading:
     """One value of one heap."""
 
     row: Row
-    """Place in the file."""
     observable: str
-    """Its name, or `CLOGGED_ROW`."""
+    """Name of the observable, or `CLOGGED_ROW`."""
     value: float
     """Value in the unit of the observable; NaN without a heap."""
     picture: str = ""
-    """The picture that it was measured on, empty if none."""
+    """Picture that it was measured on, or empty."""
     doubt: Problem | None = None
-    """Reason that it cannot be right: its unit, most often, or the size of the picture's pixels."""
+    """Reason why it is impossible, most often its unit or the size of the picture's pixels."""
 
 
 class Outlines:
-    """Outlines of the pictures of one file: each picture is looked at once, however many rows name it."""
+    """Outlines of the pictures of one file; each picture is read once."""
 
     def __init__(self) -> None:
         self._found: dict[tuple[Path, float | None], Outline | PictureError] = {}
 
     def find(self, path: Path, pixel: float | None) -> Outline:
-        """Find the outline in a picture with pixels of a size [m].
-
-        Raises
-        ------
-        imaging.PictureError
-            When the picture shows no heap.
-        """
+        """Find the outline in a picture with pixels of a size [m]; raise `PictureError` without a heap."""
         # a file of numbers needs no pictures
         from imaging import PictureError, find_outline, read_picture
 
@@ -81,33 +75,50 @@ class Outlines:
         return known
 
 
-def readings_of(
-    row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable], outlines: Outlines
-) -> Iterator[Reading]:
-    """Read everything that a row says of its heap, in a test of a size; pictures by a fit of the flanks.
+def require_same_fit(fit: str, own: str, place: str) -> None:
+    """Refuse angles of a ``fit`` other than the study's ``own``; raise `InputError`."""
+    if fit not in FITS:
+        raise InputError(place, f"must be one of {', '.join(FITS)}", fit)
+    if fit != own:
+        raise InputError(place, f"must be {own!r}, the fit of the study: other angles do not compare", fit)
 
-    What the test yields is ``known`` by name and by alias. ``outlines`` are those of the file.
+
+def readings_of(
+    row: Row, size: ValueLimits, fit: str, known: Mapping[str, Observable], outlines: Outlines
+) -> Iterator[Reading]:
+    """Read the values of a row.
+
+    Parameters
+    ----------
+    size
+        Limits of the values in the row's test.
+    fit
+        Fit of the flanks in pictures.
+    known
+        Observables of the test by name and by alias.
+    outlines
+        Outlines of the file's pictures.
 
     Raises
     ------
     InputError
-        When a cell breaks a rule.
+        When a cell is invalid.
     imaging.PictureError
-        When the picture shows no heap that can be measured.
+        When the picture has no measurable heap.
     """
     name = row["observable"]
     if row["profile"]:
         yield from _profiled(row, size, fit, known)
     elif name == CLOGGED_ROW:
         if row["value"] or row["picture"]:
-            raise row.error("stands without a value and a picture: there is no heap", "observable")
+            raise row.error("must have no value and no picture: there is no heap", "observable")
         yield Reading(row, CLOGGED_ROW, np.nan)
     elif name and name not in known:
         rule = f"must be an observable or {CLOGGED_ROW!r}, {nearest_name(name, [*known, CLOGGED_ROW])}"
         raise row.error(rule, "observable")
     elif row["value"]:
         if not name:
-            raise row.error("must say what the value is of", "observable")
+            raise row.error("is missing for the value", "observable")
         if row["fit"]:
             require_same_fit(row["fit"], fit, f"{row.file}:{row.line}: fit")
         yield _written(row, known[name], size)
@@ -115,14 +126,14 @@ def readings_of(
         yield from _seen(row, size, fit, known, outlines)
 
 
-def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
-    """Heights of the profile that a row's file has of its replicate."""
+def _profiled(row: Row, size: ValueLimits, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
+    """Read the heights of the replicate's profile from the row's file of profiles."""
     profile = SURFACE_PROFILE if size.radius is not None else OUTLINE_PROFILE
     heights = PROFILES[profile]
     if row["observable"] not in ("", profile) or row["value"] or row["picture"]:
-        raise row.error(f"stands alone, or with the observable {profile}", "profile")
+        raise row.error(f"must be alone, or with the observable {profile}", "profile")
     if heights[0] not in known:
-        rule = "needs a drum, or outlines that the study asks for (outline = true in [measurement])"
+        rule = "needs a drum, or a study with outline = true in [measurement]"
         raise row.error(rule, "profile")
     path = row.file.parent / row["profile"]
     if size.radius is not None:
@@ -131,7 +142,7 @@ def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observab
         found = read_heap_profiles(path, fit, size)
     name = row["replicate"]
     if name not in found.names:
-        rule = f"expected the file {path} has a profile of each replicate, {nearest_name(name, found.names)}"
+        rule = f"has no profile in the file {path}, {nearest_name(name, found.names)}"
         raise row.error(rule, "replicate")
     own = map(float, found.heights[found.names.index(name)])
     for station, value in zip(found.stations, own, strict=True):
@@ -139,15 +150,14 @@ def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observab
         yield Reading(row, observable.name, value, doubt=_doubt(row, observable, value, size))
 
 
-def _written(row: Row, observable: Observable, size: SizeOfTest) -> Reading:
-    """Take the value that a row gives as a number."""
+def _written(row: Row, observable: Observable, size: ValueLimits) -> Reading:
     quantity = _quantity(row)
     if not quantity.unit and not row["unit"] and observable.unit != "1":
         quantity = replace(quantity, unit=observable.unit)
     try:
         value = quantity.to_base(DIMENSIONS[observable.unit])
     except ValueError as error:
-        raise InputError(_place(row), f"expected {observable.name} {error}", str(quantity)) from None
+        raise InputError(_place(row), f"{observable.name} {error}", str(quantity)) from None
     return Reading(row, observable.name, value, doubt=_doubt(row, observable, value, size))
 
 
@@ -162,26 +172,25 @@ def _quantity(row: Row) -> Quantity:
 
 
 def _seen(
-    row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable], outlines: Outlines
+    row: Row, size: ValueLimits, fit: str, known: Mapping[str, Observable], outlines: Outlines
 ) -> Iterator[Reading]:
-    """Values of a row's picture: the observable that it names, or all of them."""
+    """Measure a row's observable, or all observables, on its picture."""
     path, name = row.file.parent / row["picture"], row["observable"]
     if name and not known[name].by_photograph:
-        raise row.error("needs a value: no photograph shows it", "observable")
+        raise row.error("needs a value: photographs do not show it", "observable")
     if not any(each.by_photograph for each in known.values()):
-        raise row.error("must be left out of a test without a heap: write the values", "picture")
-    if not os.path.isfile(path):  # a name too long is none, and raises nothing
-        raise row.error(f"must name a picture file, relative to this one (looked for {path})", "picture")
+        raise row.error("this test leaves no heap to photograph: write the values", "picture")
+    if not os.path.isfile(path):  # unlike Path.is_file, it accepts names that are too long
+        raise row.error(f"no such file: {path}", "picture")
     pixel = _pixel(row)
     if name and pixel is None and known[name].unit == "m":
-        raise row.error("a length in a picture needs the size of its pixels, as 0.1 mm", "pixel")
+        raise row.error(PIXEL_RULE, "pixel")
     # a file of numbers needs no pictures
     from imaging import PictureError, measure
 
     angle = measure(outlines.find(path, pixel), fit, str(path))
     if angle.doubts:
-        told = "; ".join(map(str, angle.doubts))
-        raise PictureError(str(path), "expected a picture counts where nothing about it is in doubt", told)
+        raise PictureError(str(path), f"the picture is doubtful: {'; '.join(map(str, angle.doubts))}")
     views = [View.of(angle)]
     for observable in dict.fromkeys(known.values()):
         wanted = observable is known[name] if name else observable.unit != "m" or pixel
@@ -198,19 +207,19 @@ def _pixel(row: Row) -> float | None:
     except ValueError as error:
         raise row.error(str(error), "pixel") from None
     if pixel <= 0.0:
-        raise row.error("must be greater than 0", "pixel")
+        raise row.error("must be positive", "pixel")
     return pixel
 
 
-def _doubt(row: Row, observable: Observable, value: float, size: SizeOfTest) -> Problem | None:
-    """Say why a value cannot be one of this test, if it cannot."""
+def _doubt(row: Row, observable: Observable, value: float, size: ValueLimits) -> Problem | None:
+    """Return the problem of a value that is impossible in this test."""
     low, high = size.limits(observable)
     if low <= value <= high:
         return None
     unit = "" if observable.unit == "1" else f" {observable.unit}"
-    question = f"is the unit right (none given:{unit})?" if unit and not row["unit"] else "is the unit right?"
-    rule = f"expected {observable.name} lies between {low:.3g} and {high:.3g}{unit} in this test: {question}"
-    return Problem(_place(row), rule, f"{value:.6g}{unit}")
+    hint = f"Check the unit (default:{unit})." if unit and not row["unit"] else "Check the unit."
+    problem = f"{observable.name} must be between {low:.3g} and {high:.3g}{unit} in this test"
+    return Problem(_place(row), problem, f"{value:.6g}{unit}", hint)
 
 
 def _place(row: Row) -> str:

@@ -12,14 +12,22 @@ import numpy as np
 from doe import Sample
 from experiments.io.errors import InputError
 from experiments.io.units import Quantity
-from experiments.measurement.copies import require_separate
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.pictures import find_pictures, measure_pictures, require_same_fit
+from experiments.measurement.photographs import (
+    PictureOptions,
+    find_pictures,
+    left_out_notes,
+    measure_pictures,
+    require_separate,
+    target_sample,
+)
 from experiments.measurement.profiles import counted_twice, with_profiles
+from experiments.measurement.readings import require_same_fit
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import ANGLE, BY_NAME
 from experiments.studyfile.target_section import ResponseSection, TargetSection
+from imaging import View
 
 
 @dataclass(frozen=True)
@@ -60,19 +68,12 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
     if section.fit is not None:
         require_same_fit(section.fit, study.measurement.fit, f"{place}.fit")
     if section.pictures is not None:
-        angles = measure_pictures(find_pictured(study), study.measurement.fit)
-        clear = {path: angle for path, angle in angles.items() if not angle.doubts}
-        notes = tuple(
-            f"{path.name} is doubtful, and left out: {'; '.join(map(str, angle.doubts))}"
-            for path, angle in angles.items()
-            if angle.doubts
-        )
-        if len(clear) < 2:
-            rule = f"needs two pictures of heaps without a doubt ({'; '.join(notes)})"
-            raise InputError(f"{place}.pictures", rule, len(clear))
-        sample = Sample.of([angle.mean for angle in clear.values()])
-        note = f"{len(clear)} pictures: {', '.join(path.name for path in clear)}"
-        return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), notes
+        options = _options(study)
+        rows = measure_pictures(find_pictured(study), options)
+        sample = target_sample(rows, options, f"{place}.pictures")
+        used = [row for row in rows if row["mean"] and (options.keep_doubtful or not row["doubts"])]
+        note = f"{len(used)} pictures: {', '.join(Path(row['picture']).name for row in used)}"
+        return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), left_out_notes(rows, options)
     if section.file is not None:
         path = study.file.parent / section.file
         measured = read_measured(path, study)
@@ -111,25 +112,35 @@ def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path
     raise InputError(f"{study.file}: target.observable", rule, f"{section.observable} ({section.scene})")
 
 
+def _options(study: Study) -> PictureOptions:
+    """Options of the pictures of a study's target."""
+    section, fit = study.target_section, study.measurement.fit
+    if section is None:
+        return PictureOptions(fit)
+    view = section.view.view if section.view else View()
+    return PictureOptions(fit, view, by=section.by, keep_doubtful=section.keep_doubtful)
+
+
 def find_pictured(study: Study) -> list[Path]:
-    """Find the photographs of heaps that are the target of a study; none where it names none.
+    """Find the photographs of heaps that are the target of a study; empty where it names no photographs.
 
     Raises
     ------
     InputError
-        When its test leaves no heap, the target is another number than the heap's angle, there are fewer than
-        two photographs, or one is a copy of another.
+        When its test leaves no heap, the target is not the heap's angle, there are fewer than two
+        photographs, or one is a copy of another.
     """
     section, place = study.target_section, f"{study.file}: target.pictures"
     if section is None or section.pictures is None:
         return []
     if not study.scene.leaves_a_heap:
-        rule = "must be left out of a test that leaves no heap; of a drum give profiles"
-        raise InputError(place, rule, study.scene.kind.name)
+        hint = "For a drum, give profiles."
+        raise InputError(place, "this test leaves no heap to photograph", study.scene.kind.name, hint)
     if section.observable != ANGLE or section.scene != TARGET_SCENE:
-        raise InputError(place, "expected photographs give the angle of the study's own scene", section.title)
-    paths = find_pictures(section.pictures, study.file.parent, place)
-    require_separate(paths, place)
+        problem = "photographs give only the angle of the study's own scene"
+        raise InputError(place, problem, section.title)
+    paths = find_pictures(section.pictures, study.file.parent, place, section.by)
+    require_separate(paths, _options(study), place)
     return paths
 
 
@@ -155,7 +166,7 @@ def target_sections(
     if not ranked or ranked[0].condition in held_out:
         return None, ()
     first, *others = [_values(study, one) for one in ranked]
-    noted = {"note": note} if note else {}
+    noted: dict[str, Any] = {"note": note} if note else {}
     return TargetSection(**first, **noted), tuple(ResponseSection(**each) for each in others)
 
 

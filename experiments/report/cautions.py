@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from experiments.calibrate.results import Campaign
-from experiments.measurement.filling import filling_missed, filling_reached, filling_told
+from experiments.measurement.filling import filling_missed, filling_reached, filling_text
 from experiments.report.kit.numbers import capital, enumeration, fixed
 from experiments.report.kit.texts import say
 from experiments.studyfile import Study
@@ -72,7 +72,7 @@ def _filling(campaign: Campaign, study: Study) -> Iterator[Caution]:
         scene = study.case({}, 0, str(name)).scene
         reached = filling_reached(scene, {"fill_height": float(rows["fill_height"].median())})
         if reached is not None and filling_missed(scene, reached):
-            yield Caution(say("caution.filling", told=filling_told(scene, reached)), "summary")
+            yield Caution(say("caution.filling", told=filling_text(scene, reached)), "summary")
 
 
 def _small(grains: float | None) -> Iterator[Caution]:

@@ -13,7 +13,7 @@ import pandas as pd
 
 from dem_warp import CaseResult
 from experiments.calibrate.results import Campaign
-from experiments.measurement.states import measure_heap
+from experiments.measurement.case_observables import measure_heap
 from experiments.report.kit.numbers import trimmed
 from experiments.studyfile import Study
 from imaging import HeapAngle, Snapshot, overlay, snapshot

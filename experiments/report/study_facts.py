@@ -22,7 +22,7 @@ def study_facts(study: Study) -> dict[str, str]:
         size = f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high"
         test = {"Tube": size, "Lift": f"{tube.lift_speed:g} m/s"}
     sizes = study.grain.sizes
-    measured = {"Sizes": sizes.cut_into_classes().told} if sizes else {}
+    measured = {"Sizes": sizes.cut_into_classes().summary} if sizes else {}
     walls = {f"Walls “{name}”": _part_text(part) for name, part in study.document.get("walls", {}).items()}
     further = study.document.get("response-scene", {})
     return {

@@ -206,7 +206,7 @@ SURFACE = tuple(f"surface_{number + 1}" for number in range(len(STATIONS)))
 """Names of the heights of the bed's surface in a drum, its profile."""
 
 OUTLINE_STATIONS = 8
-"""Places of a heap's outline, `imaging.profile.STATIONS`."""
+"""Places of a heap's outline, `imaging.flank.heap_shape.STATIONS`."""
 
 
 def _height_at(number: int, view: View) -> float:

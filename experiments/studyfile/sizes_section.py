@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dem_warp import ClumpShape, GrainPopulation, Material, SizeClasses
-from experiments.grains.sizes.classes import Classes, cut_classes
 from experiments.grains.sizes.diameters import DIAMETERS
 from experiments.grains.sizes.distribution import Continuous, Distribution
+from experiments.grains.sizes.size_classes import Classes, cut_classes
 from experiments.io.units import unit_size
 from experiments.studyfile.schema import Length, Number, Section
 
@@ -153,7 +153,7 @@ def _distribution(section: SizesSection) -> tuple[Distribution, float]:
     # the units of this package.
     from scipy import stats
 
-    from experiments.grains.sizes.tables import read_counts, read_sieves
+    from experiments.grains.sizes.size_tables import read_counts, read_sieves
 
     if section.sieves is not None:
         return read_sieves(section.sieves, section.unit)

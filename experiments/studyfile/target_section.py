@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from doe import Sample
 from experiments.io.errors import StudyError
@@ -16,13 +16,45 @@ from experiments.studyfile.campaign import MOST, TARGET_SCENE, FactorValues, Res
 from experiments.studyfile.observables import ANGLE, DIMENSIONS, PROFILES, Observable, observables_of
 from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import RawQuantity, Section
+from experiments.studyfile.schema import Angle, RawQuantity, Section
+from imaging import View
 
 MEASUREMENTS = ("mean", "sd", "n")
 """Keys that tell of the physical test."""
 
 SOURCES = ("pictures", "file", "profiles")
 """Keys of ``[target]`` that name where the measurements are taken from."""
+
+PICTURE_OPTIONS = ("by", "keep_doubtful", "view")
+"""Keys of ``[target]`` that belong to its pictures."""
+
+Grouping = Literal["picture", "folder"]
+"""Pictures of one heap."""
+
+
+class ViewSection(Section):
+    """``[target.view]``: known facts of the photographs."""
+
+    crop: tuple[int, int, int, int] | None = None
+    """Left, top, right and bottom of the part to look at, in pixels."""
+    plate: tuple[float, float, float, float] | None = None
+    """Two points x1, y1, x2, y2 on the line where the heap meets its plate, in pixels."""
+    heap: int | None = None
+    """Number of the heap, counted from the left from 1, where there are several."""
+    elevation: Angle | None = None
+    """Angle at which the camera looks down on the plate; default: measured at the heap's foot."""
+    distance: float | None = None
+    """Distance of the camera from the heap, in widths of the heap; default: from the focal length."""
+
+    @property
+    def view(self) -> View:
+        """The facts."""
+        return View(self.crop, self.plate, self.heap, self.elevation, self.distance)
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> ViewSection:
+        _ = self.view
+        return self
 
 
 class TwinSection(Section):
@@ -133,6 +165,12 @@ class TargetSection(ResponseSection):
     """Part of the flank that the measured angles were fitted to; left out: as ``[measurement]`` says."""
     pictures: str | None = None
     """Photographs of the heaps, instead of numbers: a folder, or a pattern as ``"photos/*.jpg"``."""
+    by: Grouping = "picture"
+    """Pictures of one heap: each picture is another heap, or each folder is one heap."""
+    keep_doubtful: bool = False
+    """True: doubtful pictures count."""
+    view: ViewSection | None = None
+    """Known facts of the photographs."""
     file: str | None = None
     """File of measured heaps, instead of numbers: all that it tells is to be matched, the observable first
     that is named here."""
@@ -191,6 +229,9 @@ def build_target(
 def _source(target: TargetSection, places: Places) -> str | None:
     """Key that names where the measurements are to be taken from; None where the section gives them."""
     given = [name for name in SOURCES if getattr(target, name) is not None]
+    options = [name for name in PICTURE_OPTIONS if name in target.model_fields_set]
+    if options and target.pictures is None:
+        raise StudyError(places.of(("target", options[0])), "is an option of pictures, which are missing")
     numbers = [name for name in MEASUREMENTS if getattr(target, name) is not None]
     if target.twin is not None:
         return None

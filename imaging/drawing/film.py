@@ -1,4 +1,4 @@
-"""Pictures of moving grains in and between walls, and the film of them: GIF or MP4."""
+"""Films of moving grains and walls: GIF or MP4."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imaging.drawing.render import empty_plate, snapshot
-from imaging.errors import PictureError
 from imaging.geometry import FloatArray, Frame, Picture
+from imaging.picture_error import PictureError
 
 KINDS = (".gif", ".mp4")
 """Endings of films."""
 
 CODECS = ("vp09", "mp4v")
-"""Of MP4, the first that this OpenCV can write: VP9, which browsers play, or MPEG-4 part 2."""
+"""Codecs of MP4; the first that OpenCV can write is used: VP9, which browsers play, or MPEG-4 part 2."""
 
 WALL_COLOR = (150.0, 128.0, 106.0)
 WALL_OPACITY, EDGE_OPACITY = 0.14, 0.75
@@ -28,11 +28,11 @@ SUBPIXEL_BITS = 4
 
 @dataclass(frozen=True)
 class Scenery:
-    """Part of space that every picture of a film shows, seen horizontally from far away."""
+    """Part of space in every picture of a film, seen horizontally from far away."""
 
     half_width: float
     height: float
-    """Reach to either side of the axis, and above z = 0 [m]."""
+    """Extent on either side of the axis, and above z = 0 [m]."""
     pixels: int = 640
     """Columns."""
 
@@ -50,7 +50,7 @@ class Scenery:
         Parameters
         ----------
         centers, radii, grains
-            Spheres as `snapshot` takes them; none is a picture without grains.
+            Spheres, as for `snapshot`; there may be no spheres.
         walls : sequence of (n, 3, 3) array
             Triangles of each wall [m].
         text : str
@@ -68,7 +68,6 @@ class Scenery:
         return image
 
     def _on_picture(self, triangles: FloatArray) -> FloatArray:
-        """Columns and rows of the corners of triangles (n, 3, 2)."""
         frame = self.frame
         columns = frame.shape[1] / 2 + triangles[:, :, 0] / frame.meters_per_pixel
         rows = frame.ground_rows - triangles[:, :, 2] / frame.meters_per_pixel
@@ -76,7 +75,7 @@ class Scenery:
 
 
 def _glaze(image: Picture, triangles: FloatArray) -> None:
-    """Lay the silhouette of a wall over a picture, thinly, and its rim."""
+    """Draw the transparent silhouette of a wall over a picture, and its rim."""
     mask = np.zeros(image.shape[:2], dtype=np.uint8)
     fixed = np.rint(triangles * 2**SUBPIXEL_BITS).astype(np.int32)
     for corners in fixed:
@@ -89,18 +88,18 @@ def _glaze(image: Picture, triangles: FloatArray) -> None:
 
 
 def save_film(path: str | Path, pictures: Sequence[Picture], each: float) -> None:
-    """Write pictures of one size as a film that shows each for a time [s], by its ending .gif or .mp4.
+    """Write pictures of one size as a film, .gif or .mp4, that shows each picture for a time [s].
 
     Raises
     ------
     PictureError
-        When there is no picture, the ending is another, or the film cannot be written.
+        When there is no picture, the ending is unknown, or the film cannot be written.
     """
     kind = Path(path).suffix.lower()
     if kind not in KINDS:
-        raise PictureError(str(path), f"expected a film ends in {' or '.join(KINDS)}", kind or "no ending")
+        raise PictureError(str(path), f"must end in {' or '.join(KINDS)}", kind or "no ending")
     if not pictures:
-        raise PictureError(str(path), "expected a film has at least one picture", 0)
+        raise PictureError(str(path), "a film needs at least one picture")
     (_save_gif if kind == ".gif" else _save_mp4)(str(path), pictures, each)
 
 
@@ -125,4 +124,4 @@ def _save_mp4(path: str, pictures: Sequence[Picture], each: float) -> None:
                 writer.write(np.ascontiguousarray(picture[:rows, :columns]))
             writer.release()
             return
-    raise PictureError(path, f"expected this OpenCV writes MP4 as {' or '.join(CODECS)}", "neither")
+    raise PictureError(path, f"this OpenCV cannot write MP4 ({' or '.join(CODECS)})")

@@ -1,44 +1,34 @@
-"""The plate of a heap of spheres whose height nobody told."""
+"""Height of the plate under a heap of spheres."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from imaging.errors import PictureError
 from imaging.geometry import Spheres
+from imaging.picture_error import PictureError
 
 REST = 0.02
-"""Depth of the layer in which spheres that rest on a plate have their lowest points, over the median radius:
-soft grains sink in by a hundredth or two, and a second layer starts half a radius higher."""
+"""Thickness of the layer with the lowest points of spheres on a plate, over the median radius: soft grains
+sink in by a hundredth or two, and a second layer starts half a radius higher."""
 LEAST_RESTING = 5
-"""Fewer spheres do not show where the plate is."""
+"""Fewest spheres that show a plate."""
 
 
 def find_ground(spheres: Spheres) -> float:
-    """Find the plate on which most spheres rest: the height at which the lowest points of spheres crowd.
+    """Find the height of the plate on which most spheres rest, in the unit of the spheres.
 
-    Spheres that fell off the plate lie below and do not count, nor do those that lie on others.
-
-    Parameters
-    ----------
-    spheres : Spheres
-        Spheres in any unit, z up.
-
-    Returns
-    -------
-    float
-        Height of the plate, in the same unit.
+    Spheres that fell off the plate, and those on other spheres, do not count.
 
     Raises
     ------
     PictureError
-        When no height has `LEAST_RESTING` spheres on it.
+        When fewer than `LEAST_RESTING` spheres rest at any height.
     """
     lowest = np.sort(spheres.centers[:, 2] - spheres.radii)
     layer = REST * float(np.median(spheres.radii))
     resting = np.searchsorted(lowest, lowest + layer, side="right") - np.arange(len(lowest))
     first = int(np.argmax(resting))
     if resting[first] < LEAST_RESTING:
-        rule = f"expected at least {LEAST_RESTING} spheres rest on the plate: give its height"
-        raise PictureError("plate", rule, f"{resting[first]} at one height")
+        problem = f"at least {LEAST_RESTING} spheres must rest on it: give its height"
+        raise PictureError("plate", problem, f"{resting[first]} at one height")
     return float(np.median(lowest[first : first + resting[first]]))

@@ -1,4 +1,4 @@
-"""Spheres to pixels with pyvista (VTK), off screen: without a display, and without a word on stderr."""
+"""Drawing of spheres with pyvista (VTK), without a display and without messages on stderr."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from imaging.errors import PictureError
+from imaging.drawing.raster import averaged
 from imaging.geometry import FloatArray, Frame, Picture, Spheres
+from imaging.picture_error import PictureError
 
 if TYPE_CHECKING:
     import pyvista
 
 SUPERSAMPLING = 3
-"""Drawn this many times finer than the picture, then averaged."""
+"""Factor by which the drawing is finer than the picture."""
 SECTORS, RINGS = 24, 5
 """Facets of a sphere: round the line of sight, and from its rim to its middle."""
 LIGHT_POSITION = (-0.45, 0.61, 0.65)
-"""Direction of the light, as VTK counts for a headlight: right, up, towards the camera."""
+"""Direction of the light for a VTK headlight: right, up, towards the camera."""
 QUIET_ENVIRONMENT = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow", "EGL_LOG_LEVEL": "fatal"}
-"""On Linux VTK otherwise asks an X server first, and complains on stderr where there is none."""
+"""Variables that keep VTK on Linux from asking an X server first, and from complaining on stderr."""
 PROBE = """
 import vtkmodules.vtkRenderingOpenGL2
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
@@ -41,9 +41,9 @@ raise SystemExit(0 if window.SupportsOpenGL() else 1)
 
 @functools.cache
 def opengl_works() -> bool:
-    """Tell whether VTK can draw on this machine.
+    """Return True if VTK can draw on this machine.
 
-    Tried once, in a child process: without a driver VTK does not raise an error, it ends the process.
+    The test runs once, in a child process: without a driver VTK ends the process instead of raising an error.
     """
     environment = os.environ | QUIET_ENVIRONMENT
     probe = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, check=False, env=environment)
@@ -51,16 +51,14 @@ def opengl_works() -> bool:
 
 
 def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
-    """Share of each pixel that the spheres cover, 0 to 255: as `raster.coverage`, with pyvista."""
+    """Draw the share of each pixel that the spheres cover, 0 to 255, like `raster.coverage`."""
     return shaded(spheres, np.zeros((len(spheres.radii), 3)), frame, azimuth)[:, :, 3]
 
 
 def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture:
-    """Lit spheres, (rows, columns, 4) blue-green-red and opacity: as `raster.shaded`, with pyvista."""
+    """Draw lit spheres, (rows, columns, 4) blue-green-red and opacity, like `raster.shaded`."""
     if not opengl_works():
-        raise PictureError(
-            "backend 'pyvista'", "expected VTK can draw off screen (EGL or OSMesa)", "no OpenGL driver"
-        )
+        raise PictureError("backend 'pyvista'", "VTK has no OpenGL driver to draw with (EGL or OSMesa)")
     import pyvista
 
     rows, columns = frame.shape
@@ -79,7 +77,9 @@ def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -
         _aim(plotter, frame)
         picture = plotter.screenshot(return_img=True, transparent_background=True)
         plotter.close()
-    return _reduced(np.asarray(picture), frame.shape)
+    layer = np.asarray(picture)[:, :, [2, 1, 0, 3]].astype(np.float32)
+    layer[:, :, :3] *= layer[:, :, 3:] / 255.0
+    return averaged(layer, frame.shape)
 
 
 @contextmanager
@@ -97,7 +97,7 @@ def _quiet_environment() -> Iterator[None]:
 
 
 def _aim(plotter: pyvista.Plotter, frame: Frame) -> None:
-    """Look along +y at the frame's middle, without perspective."""
+    """Look along +y at the frame's middle, with a parallel projection."""
     rows = frame.shape[0]
     middle = (frame.ground_rows - 0.5 * rows) * frame.meters_per_pixel
     distance = 4.0 * frame.half_width
@@ -110,7 +110,7 @@ def _aim(plotter: pyvista.Plotter, frame: Frame) -> None:
 
 
 def _sphere_mesh(spheres: Spheres, colors: FloatArray, azimuth: float) -> pyvista.PolyData:
-    """The near half of every sphere, in the camera's frame, with smooth normals."""
+    """Build the near half of every sphere, in the camera's frame, with smooth normals."""
     import pyvista
 
     unit, triangles = _hemisphere()
@@ -135,19 +135,7 @@ def _hemisphere() -> tuple[FloatArray, NDArray[np.int64]]:
         [rim * np.sin(tilt) * np.cos(turn), -np.cos(tilt), rim * np.sin(tilt) * np.sin(turn)], axis=-1
     )
     ring, sector = np.mgrid[0:RINGS, 0:SECTORS]
-    here, beside = ring * SECTORS + sector, ring * SECTORS + (sector + 1) % SECTORS
-    lower = np.stack([here, beside, beside + SECTORS], axis=-1)
-    upper = np.stack([here, beside + SECTORS, here + SECTORS], axis=-1)
+    here, following = ring * SECTORS + sector, ring * SECTORS + (sector + 1) % SECTORS
+    lower = np.stack([here, following, following + SECTORS], axis=-1)
+    upper = np.stack([here, following + SECTORS, here + SECTORS], axis=-1)
     return unit.reshape(-1, 3), np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
-
-
-def _reduced(picture: Picture, shape: tuple[int, int]) -> Picture:
-    """Average of the fine pixels: red-green-blue-opacity in, blue-green-red and opacity out."""
-    layer = picture[:, :, [2, 1, 0, 3]].astype(np.float32)
-    layer[:, :, :3] *= layer[:, :, 3:] / 255.0
-    small = cv2.resize(layer, shape[::-1], interpolation=cv2.INTER_AREA)
-    opacity = small[:, :, 3:] / 255.0
-    small[:, :, :3] = np.divide(
-        small[:, :, :3], opacity, out=np.zeros_like(small[:, :, :3]), where=opacity > 0
-    )
-    return np.rint(small).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""Spheres to pixels with numpy alone: exact silhouettes and a depth buffer, for machines without OpenGL."""
+"""Drawing of spheres with numpy, without OpenGL: exact silhouettes and a depth buffer."""
 
 from __future__ import annotations
 
@@ -6,30 +6,29 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from imaging.geometry import FloatArray, Frame, Picture, Spheres
+from imaging.geometry import FloatArray, Frame, Layer, Picture, Spheres
 
 SUPERSAMPLING = 4
-"""Silhouettes are drawn this many times finer than the picture, then averaged: 17 grey levels at an edge."""
+"""Factor by which the drawing of a silhouette is finer than the picture: 17 grey levels at an edge."""
 SHADING_SUPERSAMPLING = 2
-"""The same for shaded pictures, whose edges need only look smooth."""
+"""Factor for shaded pictures, whose edges need only look smooth."""
 LIGHT = np.array([-0.45, -0.65, 0.61])
 """Direction of the light in the camera's frame (right, away, up)."""
 AMBIENT = 0.45
-"""Light on a surface that is turned away from the lamp."""
+"""Light on a surface that faces away from the lamp."""
 BRIGHTNESS = 1.25
-"""Overall exposure."""
 CAVITY_SHADING = 0.6
-"""Largest darkening of what lies behind its neighbours."""
+"""Largest darkening of spheres behind their neighbours."""
 CAVITY_REACH = 0.02
-"""Neighbours shade over three radii, but at most over this share of the picture's width."""
+"""Largest reach of that shading, three radii otherwise, as a share of the picture's width."""
 FRAGMENT_LIMIT = 250_000
-"""Pixels of spheres worked on at a time while a depth buffer is filled: few enough for a cache."""
+"""Pixels of spheres that the depth buffer handles at a time: few enough for a cache."""
 
 
 def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
-    """Share of each pixel that the spheres cover, 0 to 255, seen along a horizontal orthographic camera.
+    """Draw the share of each pixel that the spheres cover, 0 to 255, with a horizontal orthographic camera.
 
-    Every sphere covers, in each fine column, one run of fine rows; the runs are opened and closed in a
+    Every sphere covers one run of fine rows in each fine column; the runs are opened and closed in a
     difference image whose running sum along the columns is the number of spheres over a pixel.
 
     Parameters
@@ -55,17 +54,10 @@ def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
 
 
 def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture:
-    """Lit spheres, seen as in `coverage`: (rows, columns, 4) blue-green-red and opacity.
+    """Draw lit spheres, (rows, columns, 4) blue-green-red and opacity, with the camera of `coverage`.
 
-    Lambert's cosine law, and the depth buffer's unsharp mask (Luft et al., ACM Trans. Graphics 25, 2006) to
-    darken what lies behind its neighbours.
-
-    Parameters
-    ----------
-    spheres, frame, azimuth
-        As in `coverage`.
-    colors : (n, 3) array
-        Blue-green-red of every sphere, 0 to 255.
+    The light follows Lambert's cosine law; the depth buffer's unsharp mask (Luft et al., ACM Trans. Graphics
+    25, 2006) darkens spheres behind their neighbours. `colors` (n, 3) are blue-green-red, 0 to 255.
     """
     owner, normal, distance = _depth_buffer(spheres, frame, azimuth)
     visible = owner >= 0
@@ -79,7 +71,12 @@ def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -
     layer = np.zeros((*owner.shape, 4))
     layer[visible, :3] = colors[owner[visible]] * light[visible, None] * BRIGHTNESS
     layer[visible, 3] = 255.0
-    small = cv2.resize(layer, frame.shape[::-1], interpolation=cv2.INTER_AREA)
+    return averaged(layer, frame.shape)
+
+
+def averaged(layer: Layer, shape: tuple[int, int]) -> Picture:
+    """Average a fine layer, colours times opacity and opacity, to a picture of colours and opacity."""
+    small = cv2.resize(layer, shape[::-1], interpolation=cv2.INTER_AREA)
     opacity = small[:, :, 3:] / 255.0
     small[:, :, :3] = np.divide(
         small[:, :, :3], opacity, out=np.zeros_like(small[:, :, :3]), where=opacity > 0
@@ -90,7 +87,7 @@ def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -
 def _depth_buffer(
     spheres: Spheres, frame: Frame, azimuth: float
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Nearest sphere of every fine pixel (-1: none), its normal and its distance [fine pixels].
+    """Find the nearest sphere of every fine pixel (-1: no sphere), its normal and distance [fine pixels].
 
     The normal is in the camera's frame: right, away, up.
     """
@@ -112,7 +109,7 @@ def _depth_buffer(
 def _pixel_positions(
     spheres: Spheres, frame: Frame, azimuth: float, supersampling: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Column, row and radius of every sphere in fine pixels; a pixel's middle is at its index + 0.5."""
+    """Columns, rows and radii of the spheres in fine pixels; a pixel's middle is at its index + 0.5."""
     scale = supersampling / frame.meters_per_pixel
     right, _, up = spheres.seen_from(azimuth).T
     middle = 0.5 * supersampling * frame.shape[1]
@@ -120,7 +117,7 @@ def _pixel_positions(
 
 
 def _spans(position: FloatArray, radii: FloatArray, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """All (sphere, column) pairs in which a column's middle lies within the sphere's width."""
+    """All (sphere, column) pairs in which a column's middle is within the sphere's width."""
     first = np.clip(np.ceil(position - radii - 0.5), 0, size).astype(np.int64)
     last = np.clip(np.floor(position + radii + 0.5), 0, size).astype(np.int64)
     counts = np.maximum(last - first, 0)

@@ -1,4 +1,4 @@
-"""Pictures of a heap of spheres: plain silhouettes to measure, shaded snapshots to look at."""
+"""Pictures of a heap of spheres: silhouettes for measurements, shaded snapshots for people."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imaging.drawing import opengl, raster
-from imaging.errors import PictureError
 from imaging.geometry import FloatArray, Frame, Picture, Spheres
+from imaging.picture_error import PictureError
 
 GRAIN_COLOR = (62.0, 94.0, 138.0)
 """Buckwheat brown, blue-green-red."""
@@ -25,9 +25,8 @@ class Snapshot:
     """A picture of a heap, with its scale."""
 
     image: Picture
-    """Grey or blue-green-red."""
+    """Picture, grey or blue-green-red."""
     meters_per_pixel: float
-    """Scale."""
     ground_row: float
     """Row of the plate's surface; whole numbers are the middles of pixels."""
     azimuth: float
@@ -42,7 +41,7 @@ def silhouette(
     backend: str = "raster",
     frame: Frame | None = None,
 ) -> Snapshot:
-    """Draw the black silhouette of a heap on white, without the plate, for measuring.
+    """Draw the black silhouette of a heap on white, without the plate.
 
     Parameters
     ----------
@@ -51,11 +50,11 @@ def silhouette(
     azimuth : float
         Direction of the camera [rad].
     pixels : int
-        Width of the heap in the picture; strays beside it make the picture wider.
+        Width of the heap in the picture; strays make the picture wider.
     backend : {"raster", "pyvista", "auto"}
-        `raster` needs numpy alone; `pyvista` needs OpenGL; `auto` takes pyvista where OpenGL works.
+        `raster` needs only numpy; `pyvista` needs OpenGL; `auto` uses pyvista where OpenGL works.
     frame : Frame, optional
-        What the picture shows, where several share it; `pixels` is then unused.
+        Frame of the picture, where several share it; `pixels` is then unused.
     """
     spheres = Spheres.of(centers, radii)
     frame = frame or Frame.around(spheres, pixels)
@@ -73,13 +72,10 @@ def snapshot(
     frame: Frame | None = None,
     grains: ArrayLike | None = None,
 ) -> Snapshot:
-    """Draw a shaded picture of a heap on its plate, to look at.
+    """Draw a shaded picture of a heap on its plate.
 
-    Its frame is that of `silhouette`, so that lines measured on one can be drawn on the other. The
-    parameters are those of `silhouette`, and
-
-    grains : (n,) array, optional
-        Grain of each sphere; grains then differ a little in shade.
+    The frame is that of `silhouette`, so that lines measured on one can be drawn on the other. The parameters
+    are those of `silhouette`, and `grains`, the grain of each sphere, which makes grains differ in shade.
     """
     spheres = Spheres.of(centers, radii)
     frame = frame or Frame.around(spheres, pixels)
@@ -92,15 +88,11 @@ def snapshot(
 
 
 class Renderer(Protocol):
-    """Drawer of spheres; both pictures are seen by a horizontal orthographic camera."""
+    """Drawer of spheres with a horizontal orthographic camera: see `raster`."""
 
-    def coverage(self, spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
-        """Share of each pixel that the spheres cover, 0 to 255."""
-        ...
+    def coverage(self, spheres: Spheres, frame: Frame, azimuth: float) -> Picture: ...
 
-    def shaded(self, spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture:
-        """Lit spheres of the given colours (n, 3), blue-green-red and opacity."""
-        ...
+    def shaded(self, spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture: ...
 
 
 def _renderer(backend: str) -> Renderer:
@@ -108,24 +100,24 @@ def _renderer(backend: str) -> Renderer:
         return opengl if opengl.opengl_works() else raster
     renderers: dict[str, Renderer] = {"raster": raster, "pyvista": opengl}
     if backend not in renderers:
-        raise PictureError("backend", "expected the backend is raster, pyvista or auto", repr(backend))
+        raise PictureError("backend", "must be raster, pyvista or auto", repr(backend))
     return renderers[backend]
 
 
 def _sphere_colors(grains: ArrayLike | None, sphere_count: int) -> FloatArray:
-    """Colour of every sphere (n, 3): that of its grain, always the same for the same number of grains."""
+    """Colours of the spheres (n, 3), by grain: always the same for the same number of grains."""
     if grains is None:
         return np.tile(GRAIN_COLOR, (sphere_count, 1))
     owner = np.asarray(grains)
     if owner.shape != (sphere_count,):
-        raise PictureError("grains", "expected there is one grain number for each sphere", owner.shape)
+        raise PictureError("grains", "must be one number for each sphere", owner.shape)
     _, rank = np.unique(owner, return_inverse=True)
     lightness = 1.0 + SHADE_SPREAD * np.random.default_rng(0).standard_normal(rank.max() + 1)
     return np.clip(np.outer(lightness[rank], GRAIN_COLOR), 0.0, 255.0)
 
 
 def empty_plate(frame: Frame) -> Picture:
-    """Draw the plate of a frame alone, blue-green-red."""
+    """Draw the plate of a frame without a heap, blue-green-red."""
     image = np.full((*frame.shape, 3), 255, dtype=np.uint8)
     image[frame.ground_rows :] = PLATE_COLOR
     image[frame.ground_rows : frame.ground_rows + 1] = PLATE_EDGE_COLOR

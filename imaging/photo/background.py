@@ -1,4 +1,4 @@
-"""Difference of every pixel from its background: evens out light, colour and polarity."""
+"""Difference of every pixel from its background, whatever the light and the colours."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from imaging.errors import PictureError
 from imaging.geometry import FloatArray, Layer, Picture
+from imaging.picture_error import PictureError
 
 BLUR = 0.5
-"""Standard deviation [pixels] of the smoothing, horizontal so that it does not lower a flat outline."""
+"""Standard deviation of the smoothing [pixels], along rows so that it does not lower a flat outline."""
 BORDER_SHARE = 0.08
-"""Part of the width and height, at the top and the upper sides, that starts the background fit."""
+"""Part of the width and height, at the top and the upper sides, where the background fit starts."""
 FIT_SAMPLES = 20_000
 """Pixels that the background surface is fitted to."""
 FIT_ROUNDS = 4
-"""Rounds of the fit, of a plane and then of the quadratic; each takes the pixels that the last explained."""
+"""Rounds of the fit of a plane, then of a quadratic; each uses the pixels that the last one explained."""
 ROBUST_ROUNDS = 15
 """Rounds of reweighting of the first plane, on the border alone."""
 SEPARATION = 5.0
-"""A heap differs from the background by this many times the background's noise, on average, at the least."""
+"""Least mean difference of a heap from the background, in multiples of the background's noise."""
 LIGHT_RANGE = 2.0
-"""Light that is brighter or dimmer than its median by more than this factor is not evened out further."""
+"""Largest factor between the light and its median that is evened out."""
 DEEPEST_SHADOW = 0.4
-"""Share of the light that a cast shadow keeps at the least: light comes from more than one lamp."""
+"""Least share of the light in a cast shadow, with more than one lamp."""
 LEAST_NOISE = 1.0
-"""Noise [of 255] below which a background counts as even: that of rounding and compression."""
+"""Noise of an even background [of 255], from rounding and compression."""
 UNEVEN = 5.0
-"""Noise [of 255] from which on a heap must differ from its background by more than two greys do."""
+"""Noise [of 255] above which a background is too uneven for small differences."""
 
 
 @dataclass(frozen=True)
@@ -38,16 +38,14 @@ class Contrast:
     """Difference of a picture from its background."""
 
     values: Layer
-    """Distance of each pixel's colour from the background's, in the light there, shape (rows,
-    columns)."""
+    """Distance of each pixel's colour from the background's in that light, shape (rows, columns)."""
     thresholds: tuple[float, ...]
-    """Thresholds, most likely first: one or two; what is above each differs clearly from the
-    noise."""
+    """One or two thresholds clearly above the noise, the most likely one first."""
     noise: float
     """Median distance of the background's own pixels."""
     colors: Layer
     background: Layer
-    """The smoothed picture and the background's surface, shape (rows, columns, channels)."""
+    """Smoothed picture and background surface, shape (rows, columns, channels)."""
 
 
 def contrast_with_background(
@@ -55,11 +53,10 @@ def contrast_with_background(
 ) -> Contrast:
     """Compare each pixel's colour with the background's.
 
-    The background is a quadratic surface in each colour channel, fitted from the border inwards to whatever
-    looks like it, so that uneven light and a coloured cloth drop out, and a heap may be darker or lighter
-    than what is behind it. The first threshold is Otsu's (IEEE Trans. SMC 9, 1979); where a plate stands
-    out far more than the heap it may cut between those two, so the second splits what is below the first
-    once more.
+    The background is a quadratic surface in each colour channel, fitted from the border inwards. So uneven
+    light and a coloured cloth do not matter, and a heap may be darker or lighter than the background. The
+    first threshold is Otsu's (IEEE Trans. SMC 9, 1979). It may separate a plate of high contrast from the
+    heap, so the second one splits what is below the first.
 
     Parameters
     ----------
@@ -67,12 +64,12 @@ def contrast_with_background(
     place : str
         Names the picture in errors.
     precision : type
-        Of the background's surface.
+        Floating point type of the background surface.
 
     Raises
     ------
     PictureError
-        When the array is no picture, or when nothing stands out of its background.
+        When the array is no picture, or nothing differs from its background.
     """
     channels = _channels(picture, place)
     blurred = cv2.GaussianBlur(channels, (0, 0), sigmaX=BLUR, sigmaY=1e-6)
@@ -91,41 +88,38 @@ def contrast_with_background(
         thresholds.append(threshold)
         values = values[values <= threshold]
     if not thresholds:
-        raise PictureError(place, "expected a heap stands out of the background", _why_none(noise))
+        if noise <= UNEVEN:
+            raise PictureError(place, "no heap differs from the background: the picture has no contrast")
+        finding = f"too uneven, by {noise:.0f} of 255"
+        raise PictureError(place, f"no heap differs from the background, which is {finding}")
     return Contrast(contrast, tuple(thresholds), noise, smooth, background)
 
 
-def _why_none(noise: float) -> str:
-    """Reason why nothing stands out: all is alike, or too uneven for anything to differ from it."""
-    if noise <= UNEVEN:
-        return "a picture without contrast"
-    return f"a background too uneven, by {noise:.0f} of 255, for a heap to differ from it"
-
-
 def unshaded(colors: Layer, own: Layer, reach: int) -> Layer:
-    """Difference of colours from a surface's own ones that a shadow on it does not make.
+    """Return the difference of colours from a surface's own ones that no shadow on it can make.
 
-    A shadow dims all channels alike and leaves no grains: what counts is the colour beside the line from the
-    surface's own to black, down to `DEEPEST_SHADOW`, and the lightness's unevenness over `reach` pixels.
+    A shadow dims all channels by one factor and shows no grains. So the difference is the distance from the
+    line between the surface's colour and black, down to `DEEPEST_SHADOW`, and the unevenness over `reach`
+    pixels.
     """
     power = np.maximum(np.einsum("ijk,ijk->ij", own, own), LEAST_NOISE)
     dimming = np.clip(np.einsum("ijk,ijk->ij", colors, own) / power, DEEPEST_SHADOW, 1.0)
-    beside = colors - dimming[:, :, None] * own
-    return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", beside, beside) + unevenness(colors, reach) ** 2))
+    away = colors - dimming[:, :, None] * own
+    return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", away, away) + unevenness(colors, reach) ** 2))
 
 
 def unevenness(colors: Layer, reach: int) -> Layer:
-    """Standard deviation of the lightness within `reach` pixels of each."""
+    """Return the standard deviation of the lightness within `reach` pixels of each pixel."""
     level = colors.mean(axis=2)
     size = (2 * reach + 1, 2 * reach + 1)
-    # Of the difference from the mean of all: squares of small numbers keep their digits.
+    # Subtract the mean first, so that squares of small differences keep their digits.
     level = level - level.mean()
     mean, square = cv2.blur(level, size), cv2.blur(level * level, size)
     return np.asarray(np.sqrt(np.maximum(square - mean * mean, 0.0)))
 
 
 def otsu_threshold(values: Layer) -> float:
-    """Value that splits `values` in two classes with the largest variance between them (Otsu 1979)."""
+    """Return the value that splits `values` in two classes with the largest variance between them (Otsu)."""
     low, high = float(values.min()), float(values.max())
     counts, edges = np.histogram(values, bins=512, range=(low, max(high, low + 1e-9)))
     weight = np.cumsum(counts) / counts.sum()
@@ -141,15 +135,15 @@ def otsu_threshold(values: Layer) -> float:
 def _channels(picture: Picture, place: str) -> Layer:
     layered = picture[:, :, None] if picture.ndim == 2 else picture
     if layered.ndim != 3 or layered.shape[2] not in (1, 3) or picture.dtype != np.uint8:
-        rule = "expected a picture is a (rows, columns) or (rows, columns, 3) array of uint8"
-        raise PictureError(place, rule, f"{picture.shape} of {picture.dtype}")
+        problem = "must be a (rows, columns) or (rows, columns, 3) array of uint8"
+        raise PictureError(place, problem, f"{picture.shape} of {picture.dtype}")
     if min(layered.shape[:2]) < 16:
-        raise PictureError(place, "expected a picture has at least 16 rows and columns", picture.shape)
+        raise PictureError(place, "must have at least 16 rows and columns", picture.shape)
     return layered.astype(np.float32)
 
 
 def _background(channels: Layer) -> tuple[FloatArray, float]:
-    """Coefficients of the quadratic surface through the background's pixels, and their median distance."""
+    """Fit the quadratic surface to the background's pixels; return it with their median distance."""
     rows, columns, _ = channels.shape
     stride = max(1, int(np.sqrt(rows * columns / FIT_SAMPLES)))
     row, column = (axis.ravel() for axis in np.mgrid[0:rows:stride, 0:columns:stride])
@@ -163,7 +157,7 @@ def _background(channels: Layer) -> tuple[FloatArray, float]:
     before: tuple[int, bytes] | None = None
     for size in (*[3] * FIT_ROUNDS, *[6] * FIT_ROUNDS):
         chosen = residual <= max(4.0 * noise, 2.0 * LEAST_NOISE)
-        # A round on the pixels of the last one repeats it; behind a drawn heap all rounds but the first do.
+        # A round on the same pixels repeats the last one; in drawn pictures all rounds do.
         if (now := (size, chosen.tobytes())) == before:
             continue
         before = now
@@ -176,7 +170,7 @@ def _background(channels: Layer) -> tuple[FloatArray, float]:
 def _evaluated(
     surface: FloatArray, shape: tuple[int, ...], precision: type[np.float32 | np.float64]
 ) -> Layer:
-    """A quadratic or a plane at every pixel; in single precision without its terms at every pixel."""
+    """Evaluate a quadratic or a plane at every pixel; single precision saves the terms at every pixel."""
     rows, columns = shape[:2]
     if precision is np.float64:
         row, column = (axis.ravel() for axis in np.mgrid[0:rows, 0:columns])
@@ -192,13 +186,13 @@ def _evaluated(
 
 
 def _light(background: Layer) -> Layer:
-    """Brightness of the light relative to its median: where it is dim, heap and background differ less."""
+    """Brightness of the light over its median: in dim light, heap and background differ less."""
     level = np.linalg.norm(background, axis=2)
     return np.clip(level / max(float(np.median(level)), LEAST_NOISE), 1.0 / LIGHT_RANGE, LIGHT_RANGE)
 
 
 def _robust_plane(terms: FloatArray, sample: FloatArray) -> FloatArray:
-    """Plane with the least sum of distances, by reweighting: a heap at the border hardly moves it."""
+    """Fit a plane by least absolute deviations: a heap at the border hardly changes it."""
     weight = np.ones(len(sample))
     for _ in range(ROBUST_ROUNDS):
         root = np.sqrt(weight)[:, None]
@@ -211,7 +205,7 @@ def _robust_plane(terms: FloatArray, sample: FloatArray) -> FloatArray:
 
 
 def _least_squares(terms: FloatArray, sample: FloatArray) -> FloatArray:
-    """Fit by the normal equations, for many pixels and few terms from -1 to 1, far from dependent."""
+    """Solve the normal equations, for many pixels and a few well-conditioned terms."""
     return np.asarray(np.linalg.lstsq(terms.T @ terms, terms.T @ sample, rcond=None)[0])
 
 

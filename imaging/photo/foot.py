@@ -1,7 +1,6 @@
-"""The heap's foot on a plate whose top is seen: below the plate's far edge, down to the front of its base.
+"""The heap's foot seen from above: below the plate's far edge, down to the front of its base.
 
-A camera that looks down on the plate sees the heap before the plate's far edge. The base of a heap is round,
-so that its front is half an ellipse, whose half axes give the camera's height.
+The base of a heap is round, so its front is half an ellipse, whose half axes give the camera's height.
 """
 
 from __future__ import annotations
@@ -12,52 +11,52 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from imaging.flank.plate_line import PlateLine
 from imaging.geometry import FloatArray, Layer
 from imaging.photo.background import unevenness, unshaded
-from imaging.plate import PlateLine
 
 SIDE_SHARE = 0.05
 """Part of the plate's width, at either end, that shows the plate's own colours."""
 LIKENESS = 4.0
-"""Heap and plate are told apart where they differ by this many times the plate's noise."""
+"""Least difference of heap and plate, in multiples of the plate's noise."""
 LEAST_DIFFERENCE = 12.0
-"""Difference [of 255] below which two colours are alike: compression and light differ by as much."""
+"""Least difference of two colours [of 255]: compression and light make less."""
 TEXTURE_SHARE = 0.015
-"""Grains and the gaps between them, as a share of the heap's width: closed before the foot is outlined."""
+"""Size of grains and gaps, as a share of the heap's width: gaps are closed before the foot is outlined."""
 ARC_ROUNDS = 12
-"""Rounds of reweighting of the arc, which leave single grains aside."""
+"""Rounds of reweighting of the arc, which reduce the weight of single grains."""
 CORE = 0.95
-"""Part of the half width over which the arc is fitted: at its ends it is upright."""
+"""Part of the half width over which the arc is fitted: its ends are upright."""
 ROW_SHARE = 0.8
-"""Part of a body's width over which its heap rises where the body ends with it: but for a grain or two."""
+"""Least part of a body's width over which its heap rises, if the body is no wider than the heap."""
 ROW_DEPTH = 0.065
-"""Depth of the lowest row of grains, in the heap's widths: that of a heap of some sixteen grains across."""
+"""Depth of the lowest row of grains, in the heap's widths, for a heap of sixteen grains across."""
 ROW_UNEVENNESS = 0.5
-"""Unevenness of the lowest row over that of the grains above it: a board is even."""
+"""Least unevenness of the lowest row over that of the grains above it: a board is even."""
 LEAST_RISE = 4.0
-"""A heap rises where it is this high over the line [pixels]: a blurred edge and a lens make less."""
+"""Least height of a heap over the line [pixels]: a blurred edge and a lens make less."""
 LEAST_ARC = 3.0
-"""A foot is seen where it is this many of its standard errors deep, and as many pixels."""
+"""Least depth of a visible foot, in its standard errors and in pixels."""
 
 
 @dataclass(frozen=True)
 class PlateTop:
-    """View below the plate's line."""
+    """Picture below the plate's line."""
 
     level: Layer
-    """Difference from the plate's own colours over that at which the heap is cut out; 0 above the line,
-    shape (rows, columns)."""
+    """Difference from the plate's own colours over the threshold for the heap; 0 above the line, shape (rows,
+    columns)."""
     alike: bool
-    """Heap and plate are too alike to tell where the heap ends."""
+    """True where heap and plate are too similar to find the heap's end."""
 
 
 def below_plate(
     colors: Layer, heap: NDArray[np.bool_], body: NDArray[np.bool_], plate: PlateLine
 ) -> PlateTop:
-    """Compare what lies below the plate's line with the plate.
+    """Compare what is below the plate's line with the plate.
 
-    Each line along the plate, levelled, goes from the colour at its left end to that at its right: so a
-    plate's top, its front and the light on them drop out, and what remains is the heap, or its shadow.
+    The plate's own colour along each levelled row is interpolated between its two ends, which removes its
+    top, its front and the light on them; the heap remains, or its shadow.
 
     Parameters
     ----------
@@ -65,7 +64,7 @@ def below_plate(
     heap : (rows, columns) bool array
         The part of the heap above the plate's line.
     body : (rows, columns) bool array
-        All that stands out of the wall, with the plate.
+        The whole foreground, with the plate.
     plate : PlateLine
     """
     rows, columns = heap.shape
@@ -86,7 +85,7 @@ def below_plate(
     share = np.clip((np.arange(columns) - ends[0]) / max(ends[1] - ends[0], 1), 0.0, 1.0).astype(np.float32)
     own = middles[0][:, None] + share[None, :, None] * (middles[1] - middles[0])[:, None]
     least = max(LIKENESS * noise, LEAST_DIFFERENCE)
-    difference, typical = _told_apart(flat[first:], own, colors, heap, least)
+    difference, typical = _difference_from_plate(flat[first:], own, colors, heap, least)
     upper = nothing.copy()
     upper[first:] = difference / max(0.5 * typical, least)
     back = np.array([[1.0, 0.0, 0.0], [plate.slope, 1.0, 0.0]])
@@ -94,12 +93,12 @@ def below_plate(
     return PlateTop(level, alike=typical < least)
 
 
-def _told_apart(
+def _difference_from_plate(
     below: Layer, own: Layer, colors: Layer, heap: NDArray[np.bool_], least: float
 ) -> tuple[Layer, float]:
-    """Difference below the line from the plate's own colours, and that of the heap above the line from them.
+    """Return differences from the plate's own colours: of the pixels below the line, and of the heap above.
 
-    A shadow's share is left out, unless the heap then differs no more: grey powder on a grey plate.
+    Shadows do not count, unless the heap would then not differ: grey powder on a grey plate.
     """
     covered = heap.any(axis=0)
     reach = max(1, round(0.5 * TEXTURE_SHARE * int(covered.sum())))
@@ -115,16 +114,16 @@ def _told_apart(
 def is_lowest_row(
     colors: Layer, heap: NDArray[np.bool_], body: NDArray[np.bool_], plate: PlateLine, least: float
 ) -> bool:
-    """Tell if what was taken for a plate is the heap's lowest row of grains, whose tops lie on a line too.
+    """Return True if the supposed plate is the heap's lowest row of grains, whose tops are on a line too.
 
-    It is no wider than the heap, a grain deep, of the heap's colours but for their shade, and as uneven.
+    Such a row is as wide as the heap, a grain deep, of the heap's hues, and as uneven.
 
     Parameters
     ----------
     colors, heap, body, plate
-        As for `below_plate`.
+        Arguments of `below_plate`.
     least : float
-        Difference of colours [of 255] from which on two are not alike.
+        Least difference of two colours [of 255].
     """
     covered = np.flatnonzero(body.any(axis=0))
     width = float(np.ptp(covered))
@@ -133,7 +132,7 @@ def is_lowest_row(
     if len(rising) == 0 or np.ptp(rising) < ROW_SHARE * width:
         return False
     lowest = np.where(body, below, -np.inf).max(axis=0)[covered]
-    # Half of the columns, not all: a grain may lie before the others.
+    # Half of the columns, not all: a grain may be in front of the others.
     if float(np.median(lowest)) > ROW_DEPTH * width:
         return False
     row, above = body & (below > 0.0), heap & (below > -ROW_DEPTH * width)
@@ -147,7 +146,7 @@ def is_lowest_row(
 
 
 def joined_foot(heap: NDArray[np.bool_], level: Layer, plate: PlateLine) -> NDArray[np.bool_]:
-    """The heap above the plate's line with the foot that goes on below it."""
+    """Join the heap above the plate's line with its foot below."""
     rows, columns = heap.shape
     width = int(np.ptp(np.flatnonzero(heap.any(axis=0)))) + 1
     size = 2 * max(1, round(0.5 * TEXTURE_SHARE * width)) + 1
@@ -156,7 +155,7 @@ def joined_foot(heap: NDArray[np.bool_], level: Layer, plate: PlateLine) -> NDAr
     lower = np.greater(cv2.morphologyEx(cut, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), 0)
     line = plate.rows_at(np.arange(columns))
     row = np.arange(rows)[:, None]
-    # The plate's edge itself, blurred, belongs to neither: the heap goes on through it where it does below.
+    # The plate's blurred edge belongs to neither: the heap goes through it where it continues below.
     seam = (row >= line - 1.5) & (row <= line + 3.0) & heap.any(axis=0)
     whole = heap | (lower & (row > line)) | seam
     _, labels = cv2.connectedComponents(whole.astype(np.uint8), connectivity=4)
@@ -177,7 +176,7 @@ class Base:
 
     @property
     def seen(self) -> bool:
-        """The base is a curve, and no line."""
+        """True where the base is curved."""
         return self.depth > LEAST_ARC * max(self.depth_se, 1.0)
 
     @property
@@ -198,14 +197,14 @@ class Base:
 
 
 def front_of_base(bottom: FloatArray, slope: float | None) -> Base:
-    """Fit the front of the base to the lower edge of a heap, the sum of distances being least.
+    """Fit the front of the base to the lower edge of a heap by least absolute deviations.
 
     Parameters
     ----------
     bottom : (columns,) array
         Rows of the lower edge; NaN outside the heap.
     slope : float, optional
-        Of the plate; left out, it is fitted.
+        Slope of the plate; default: it is fitted.
     """
     columns = np.flatnonzero(np.isfinite(bottom)).astype(np.float64)
     ends = (float(columns[0]) - 0.5, float(columns[-1]) + 0.5)

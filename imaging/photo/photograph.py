@@ -1,6 +1,6 @@
-"""Photographs to outlines: a heap before a wall, on a plate, under somebody's lamp, in somebody's hand.
+"""Outlines of heaps on photographs, with any wall, plate and light.
 
-A large picture is searched on a reduced copy; the edge that is found there is refined at full size.
+A large picture is searched on a reduced copy; the edge found there is refined at full size.
 """
 
 from __future__ import annotations
@@ -11,12 +11,19 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from imaging.errors import PictureError
-from imaging.fits import FitSettings
-from imaging.flanks import fit_flanks
+from imaging.flank.camera_height import level_angle
+from imaging.flank.fit_settings import FitSettings
+from imaging.flank.flank_line import fit_flanks
+from imaging.flank.outline import Doubt, Outline, levelled
+from imaging.flank.plate_line import PlateLine
 from imaging.geometry import FloatArray, Picture
-from imaging.outline import Outline, levelled
 from imaging.photo.background import Contrast, contrast_with_background
+from imaging.photo.contrast_variants import (
+    with_filled_gaps,
+    with_low_threshold,
+    without_board,
+    without_shadows,
+)
 from imaging.photo.doubts import (
     LARGEST_LEAN,
     LARGEST_MISFIT,
@@ -25,29 +32,39 @@ from imaging.photo.doubts import (
     doubts_of,
     relative_misfit,
 )
-from imaging.photo.looks import apart_from_plate, grains_together, with_faint, without_shadows
-from imaging.photo.shade import MOST_SHADED, WIDELY_SHADED, ShadedEdge, shaded_edge, without_sharp_shadows
-from imaging.photo.sighting import Sighting, darker_below, refuse_brimful, sight, without_strays
-from imaging.photo.view import View, level_angle
-from imaging.plate import PlateLine
-from imaging.reasons import Doubt
+from imaging.photo.heap_on_plate import (
+    FoundHeap,
+    darker_below,
+    locate_heap,
+    refuse_narrow_base,
+    without_strays,
+)
+from imaging.photo.view_settings import View
+from imaging.photo.wall_shadow import (
+    MOST_SHADED,
+    WIDELY_SHADED,
+    ShadedEdge,
+    shaded_edge,
+    without_sharp_shadows,
+)
+from imaging.picture_error import PictureError
 
 NO_HEAP = 0.1
-"""Misfit of the flanks' shape, in heights, from which on it is no heap: half a circle, 0.075, is doubtful."""
+"""Misfit of the flanks' shape, in heights, above which it is no heap: half a circle has 0.075."""
 CROOKED = 0.03
-"""Misfit of the flanks' shape, in heights, that another look at the picture may better."""
+"""Misfit of the flanks' shape, in heights, above which other variants of the contrast are tried."""
 NEARLY = 2.0
-"""Factor between misfits beyond which the better one shows the heap, and the other something beside it."""
+"""Factor between misfits above which only the better one shows the heap."""
 WELL = 0.5
-"""Misfit up to which a heap is well shown, whatever shows it better: half of what is doubted."""
+"""Misfit below which a heap counts whatever fits better: half of the limit for doubts."""
 APART = 1.5
-"""Factor between thresholds from which on one confirms the other: at nearer ones a shadow ends there too."""
+"""Factor between thresholds above which one confirms the other: at closer ones a shadow ends there too."""
 AS_GOOD = 1.3
-"""Factor between misfits that are about the same: two thresholds on one heap differ by as much."""
+"""Factor within which misfits are equal: two thresholds on one heap differ by as much."""
 LEAST_STEP = 15.0
-"""Difference of colours [of 255] across an edge below which it is not refined."""
+"""Smallest difference of colours [of 255] across an edge that is refined."""
 SEARCHED_PIXELS = 800_000
-"""A larger picture is searched on a copy of about this many pixels."""
+"""Size of the copy on which a larger picture is searched [pixels]."""
 
 
 def photographed_outline(picture: Picture, view: View, meters_per_pixel: float | None, place: str) -> Outline:
@@ -56,12 +73,11 @@ def photographed_outline(picture: Picture, view: View, meters_per_pixel: float |
     cut = picture[part]
     left, top = part[1].start, part[0].start
     factor = max(1, round(np.sqrt(cut.shape[0] * cut.shape[1] / SEARCHED_PIXELS)))
-    sighting = find_heap(_reduced(cut, factor), _given_plate(view, left, top, factor), view, place)
+    found = find_heap(_reduced(cut, factor), _given_plate(view, left, top, factor), view, place)
     if view.elevation is not None:
-        sighting = replace(sighting, elevation=view.elevation, elevation_se=0.0)
-    columns = np.flatnonzero(np.isfinite(sighting.rows)).astype(np.float64)
-    rows = sighting.rows[columns.astype(np.intp)]
-    plate = sighting.plate
+        found = replace(found, elevation=view.elevation, elevation_se=0.0)
+    columns, rows = found.edge()
+    plate = found.plate
     if factor > 1:
         columns, rows = _refined(cut, columns, rows, factor)
         row = factor * (plate.row + 0.5) - 0.5 - plate.slope * (0.5 * factor - 0.5)
@@ -73,21 +89,21 @@ def photographed_outline(picture: Picture, view: View, meters_per_pixel: float |
         height,
         plate,
         meters_per_pixel,
-        elevation=sighting.elevation,
-        elevation_se=sighting.elevation_se,
+        elevation=found.elevation,
+        elevation_se=found.elevation_se,
         distance=view.distance_of(float(np.ptp(position))),
         photographed=True,
-        doubts=sighting.doubts,
+        doubts=found.doubts,
     )
 
 
 def _refined(
     picture: Picture, columns: FloatArray, rows: FloatArray, factor: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Columns and rows of an edge at full size, from those on the reduced copy.
+    """Refine an edge at full size, given its columns and rows on the reduced copy.
 
-    In each column the edge is where the colour is halfway from that above the strip of `2 * factor` pixels
-    about the coarse edge to that below it; where the two hardly differ, the coarse edge stays.
+    In each column the edge is where the colour is halfway between that above and that below a strip of
+    `2 * factor` pixels about the coarse edge; where the two hardly differ, the coarse edge is kept.
     """
     coarse_columns, coarse_rows = (factor * (value + 0.5) - 0.5 for value in (columns, rows))
     fine = np.arange(np.ceil(coarse_columns[0]), np.floor(coarse_columns[-1]) + 1)
@@ -122,7 +138,7 @@ def _reduced(picture: Picture, factor: int) -> Picture:
 
 
 def _given_plate(view: View, left: int, top: int, factor: int) -> PlateLine | None:
-    """The plate's line as a person gave it, in the reduced copy of the part."""
+    """Return the plate's line of the view in the reduced copy of the part."""
     if view.plate is None:
         return None
     x1, y1, x2, y2 = view.plate
@@ -131,145 +147,143 @@ def _given_plate(view: View, left: int, top: int, factor: int) -> PlateLine | No
     return PlateLine((row + 0.5 - slope * (0.5 - 0.5 * factor)) / factor - 0.5, slope, visible=True)
 
 
-def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str) -> Sighting:
-    """Find the heap in a picture of moderate size: of several thresholds the one that shows it best.
+def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str) -> FoundHeap:
+    """Find the heap in a picture of moderate size, at the threshold that shows it best.
 
-    An edge of a heap stays where it is whatever the threshold; where those that show a heap without a doubt
-    disagree on its angle, there is one.
+    The edge of a heap does not depend on the threshold: the angle is in doubt where thresholds without doubts
+    disagree about it.
     """
     seen = contrast_with_background(picture, place, np.float32)
     best, finding = _best_seen(seen, given, view, place)
     if best.crooked > NO_HEAP:
-        rule = "expected two straight flanks meet at the tip of a heap"
-        raise PictureError(place, rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines")
-    shaded = shaded_edge(seen, best.sighting.rows, best.sighting.plate)
+        finding = f"an outline that deviates from two lines by {best.crooked:.2f} of its height"
+        raise PictureError(place, "no heap: two straight flanks must meet at its tip", finding)
+    shaded = shaded_edge(seen, best.heap.rows, best.heap.plate)
     doubted = _doubt_of_shade(shaded, best, place)
     if shaded.share > MOST_SHADED:
-        width = int(np.isfinite(best.sighting.rows).sum())
+        width = int(np.isfinite(best.heap.rows).sum())
         if lit := _without_sharp_shadow(seen, width, given, view, place):
             best, finding, doubted = lit, "", []
     if given is None:
-        refuse_brimful(seen, best.sighting, best.ends, place)
-    doubts = list(best.sighting.doubts)
-    if given is None and darker_below(seen, best.sighting, best.ends):
-        doubts.append(
-            Doubt("shade", "what is below the whole heap is darker than beside it: its shadow, or a dish?")
-        )
+        refuse_narrow_base(seen, best.heap, best.ends, place)
+    doubts = list(best.heap.doubts)
+    if given is None and darker_below(seen, best.heap, best.ends):
+        doubts.append(Doubt("shade", "it is darker below the heap than on both sides: a shadow, or a dish?"))
     doubts += doubted
     if best.clear and finding:
         doubts.append(Doubt("threshold", finding))
-    return replace(best.sighting, doubts=tuple(doubts))
+    return replace(best.heap, doubts=tuple(doubts))
 
 
-def _best_seen(seen: Contrast, given: PlateLine | None, view: View, place: str) -> tuple[Judged, str]:
-    """The heap that shows best, and what speaks against where its edge is, if anything does.
+def _best_seen(seen: Contrast, given: PlateLine | None, view: View, place: str) -> tuple[Candidate, str]:
+    """Return the best candidate, and a finding that speaks against its edge, or an empty text.
 
-    Another look counts where it leaves fewer doubts than the plain one, none where this refuses, or where its
-    thresholds disagree.
+    A variant of the contrast counts where it leaves fewer doubts than the plain contrast, leaves none where
+    this shows no heap, or where the thresholds of this disagree.
     """
-    tries, errors = _tries(with_faint(seen), given, view, place)
-    plain = [judged for judged in tries if judged.clear]
-    best = _first_of_best(tries)
-    filled: list[Judged] = []
+    candidates, errors = _candidates(with_low_threshold(seen), given, view, place)
+    plain = [each for each in candidates if each.clear]
+    best = _first_of_best(candidates)
+    filled: list[Candidate] = []
     if best is None or not best.steady(plain) or best.crooked > CROOKED:
-        shadowless, _ = _tries(without_shadows(seen), given, view, place)
+        shadowless, _ = _candidates(without_shadows(seen), given, view, place)
         others = list(shadowless)
         if best is None or not best.clear or best.crooked > CROOKED or best.shift(plain) > LARGEST_SHIFT:
-            filled, _ = _tries(grains_together(seen), given, view, place)
-            others += filled + _tries(apart_from_plate(seen), given, view, place)[0]
+            filled, _ = _candidates(with_filled_gaps(seen), given, view, place)
+            others += filled + _candidates(without_board(seen), given, view, place)[0]
             if best is None:
-                others = [judged for judged in others if judged.clear]
+                others = [each for each in others if each.clear]
             if best is None or best.clear or any(len(other.doubts) < len(best.doubts) for other in others):
-                tries = tries + others
-                best = _first_of_best(tries)
+                candidates = candidates + others
+                best = _first_of_best(candidates)
             if best is None:
                 raise errors[0]
         else:
-            tries = tries + others
-        if best.clear and best.shift(tries) > LARGEST_SHIFT:
-            best, tries = _without_its_shadow(best, plain, shadowless, tries)
-    if any(best is judged for judged in filled) and not best.confirmed(tries):
-        return best, "no other threshold shows a heap like this, of grains in part as light as the wall"
-    shift = best.shift(tries)
+            candidates = candidates + others
+        if best.clear and best.shift(candidates) > LARGEST_SHIFT:
+            best, candidates = _without_its_shadow(best, plain, shadowless, candidates)
+    if any(best is each for each in filled) and not best.confirmed(candidates):
+        return best, "no other threshold shows this heap: some grains are as light as the wall"
+    shift = best.shift(candidates)
     if shift > LARGEST_SHIFT:
-        return best, f"the angle moves by {shift:.1f} degrees with the threshold, over {LARGEST_SHIFT:g}"
+        return best, f"the angle changes by {shift:.1f} degrees with the threshold, over {LARGEST_SHIFT:g}"
     return best, ""
 
 
 def _without_its_shadow(
-    best: Judged, plain: list[Judged], shadowless: list[Judged], tries: list[Judged]
-) -> tuple[Judged, list[Judged]]:
-    """The best one, and what it has to agree with, where a shadow alone moves the edge with the threshold.
+    best: Candidate, plain: list[Candidate], shadowless: list[Candidate], candidates: list[Candidate]
+) -> tuple[Candidate, list[Candidate]]:
+    """Return the best candidate and those it must agree with, where only a shadow moves the edge.
 
-    That is so where the look without shadows shows one edge at both of its thresholds, and so does one of the
-    plain ones, or there is only one of them, without any to confirm it.
+    This is so where both thresholds without shadows show one edge, and one of the plain candidates shows it
+    too, or there is only one of these.
     """
-    if len(shadowless) < 2 or not all(judged.clear for judged in shadowless):
-        return best, tries
-    firm = min(shadowless, key=lambda judged: judged.misfit)
+    if len(shadowless) < 2 or not all(each.clear for each in shadowless):
+        return best, candidates
+    firm = min(shadowless, key=lambda each: each.misfit)
     if firm.shift(shadowless) > LARGEST_SHIFT or firm.misfit > max(NEARLY * best.misfit, WELL):
-        return best, tries
-    if len(plain) > 1 and not any(firm.like(judged) for judged in plain):
-        return best, tries
+        return best, candidates
+    if len(plain) > 1 and not any(firm.like(each) for each in plain):
+        return best, candidates
     return best if firm.like(best) else firm, shadowless
 
 
 def _without_sharp_shadow(
     seen: Contrast, width: int, given: PlateLine | None, view: View, place: str
-) -> Judged | None:
-    """The heap, about so wide, without its sharp shadow, where both thresholds show it without a doubt."""
-    tries, _ = _tries(without_sharp_shadows(seen, width), given, view, place)
-    firm = _first_of_best(tries)
-    if firm is None or len(tries) < 2 or not all(judged.clear for judged in tries):
+) -> Candidate | None:
+    """Find the heap of a width without its sharp shadow; None unless both thresholds show it undoubted."""
+    candidates, _ = _candidates(without_sharp_shadows(seen, width), given, view, place)
+    firm = _first_of_best(candidates)
+    if firm is None or len(candidates) < 2 or not all(each.clear for each in candidates):
         return None
-    if firm.shift(tries) > LARGEST_SHIFT:
+    if firm.shift(candidates) > LARGEST_SHIFT:
         return None
-    shaded = shaded_edge(seen, firm.sighting.rows, firm.sighting.plate)
+    shaded = shaded_edge(seen, firm.heap.rows, firm.heap.plate)
     return firm if shaded.share <= MOST_SHADED else None
 
 
-def _doubt_of_shade(shaded: ShadedEdge, best: Judged, place: str) -> list[Doubt]:
-    """A doubt where bands of shaded wall lie along much of a flank, or the angle without them is another one.
+def _doubt_of_shade(shaded: ShadedEdge, best: Candidate, place: str) -> list[Doubt]:
+    """Doubt the angle where bands of shaded wall along a flank are long, or change the angle.
 
-    Some windows between grains are as even as a shadow and of the wall's hue, above all before a wall whose
-    pattern widens what counts as its hue: so short, and so shallow, they make nothing of the angle.
+    Gaps between grains may be as even as a shadow and of the wall's hue, but they are short and shallow and
+    do not change the angle.
     """
     if shaded.share <= MOST_SHADED:
         return []
-    found = f"{shaded.share:.2f} of a flank's edge has wall below it, darker, and no grains: a sharp shadow?"
+    finding = f"{shaded.share:.2f} of a flank's edge has darker wall below it, and no grains: a sharp shadow?"
     if shaded.share <= WIDELY_SHADED:
         try:
-            below = _judged(replace(best.sighting, rows=shaded.rows), place)
+            below = _candidate(replace(best.heap, rows=shaded.rows), place)
         except PictureError:
-            return [Doubt("shade", found)]
+            return [Doubt("shade", finding)]
         if best.like(below):
             return []
-    return [Doubt("shade", found)]
+    return [Doubt("shade", finding)]
 
 
-def _tries(
+def _candidates(
     seen: Contrast, given: PlateLine | None, view: View, place: str
-) -> tuple[list[Judged], list[PictureError]]:
-    """Heaps at the thresholds of a contrast, and why others show none."""
-    tries, errors = [], []
+) -> tuple[list[Candidate], list[PictureError]]:
+    """Return the heaps at the thresholds of a contrast, and the errors of thresholds without a heap."""
+    candidates, errors = [], []
     for threshold in seen.thresholds:
         try:
-            found = without_strays(sight(seen, threshold, given, view, place))
-            tries.append(replace(_judged(found, place), threshold=threshold))
+            heap = without_strays(locate_heap(seen, threshold, given, view, place))
+            candidates.append(replace(_candidate(heap, place), threshold=threshold))
         except PictureError as error:
             errors.append(error)
-    return tries, errors
+    return candidates, errors
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A sighting with the angle of its whole flanks [degrees], what speaks against it, and its misfit.
+class Candidate:
+    """A found heap with the angle of its whole flanks [degrees], its doubts and its misfit.
 
-        `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`); `ends` are where its
-    lines meet the plate, `threshold` is where the contrast was cut.
+    `crooked` is the misfit of the flanks alone, in heights (see `relative_misfit`); `ends` are the positions
+    where the lines meet the plate, `threshold` is that of the contrast.
     """
 
-    sighting: Sighting
+    heap: FoundHeap
     mean: float
     doubts: tuple[Doubt, ...]
     misfit: float
@@ -279,52 +293,49 @@ class Judged:
 
     @property
     def clear(self) -> bool:
-        """There is no doubt."""
+        """True where there is no doubt."""
         return not self.doubts
 
-    def like(self, other: Judged) -> bool:
-        """The angles are the same within what a threshold may change."""
+    def like(self, other: Candidate) -> bool:
+        """Return True if the angles are equal within the change that a threshold may make."""
         return abs(other.mean - self.mean) <= LARGEST_SHIFT
 
-    def confirmed(self, others: Sequence[Judged]) -> bool:
-        """Another one, doubtful or not, has about the same angle."""
+    def confirmed(self, others: Sequence[Candidate]) -> bool:
+        """Return True if another one, doubtful or not, has about the same angle."""
         return any(self.like(other) for other in others if other is not self)
 
-    def steady(self, others: Sequence[Judged]) -> bool:
-        """There is no doubt, one at quite another threshold confirms it, and none of `others` disagrees."""
+    def steady(self, others: Sequence[Candidate]) -> bool:
+        """Return True if there is no doubt, a distant threshold confirms it, and none of `others` differs."""
         low, high = self.threshold / APART, self.threshold * APART
         away = [other for other in others if not low < other.threshold < high]
         return self.clear and self.confirmed(away) and self.shift(others) <= LARGEST_SHIFT
 
-    def shift(self, others: Sequence[Judged]) -> float:
-        """Greatest change of the angle [degrees] among others without a doubt that fit well or nearly so."""
+    def shift(self, others: Sequence[Candidate]) -> float:
+        """Return the greatest change of the angle [degrees] among others without doubts that fit well."""
         limit = max(NEARLY * self.misfit, WELL)
         rivals = [other for other in others if other.clear and other.misfit <= limit]
         return max((abs(other.mean - self.mean) for other in rivals), default=0.0)
 
 
-def _first_of_best(tries: Sequence[Judged]) -> Judged | None:
-    """The first with the fewest doubts that fits about as well as the best of these."""
-    fewest = min((len(judged.doubts) for judged in tries), default=0)
-    good = [judged for judged in tries if len(judged.doubts) == fewest]
-    limit = AS_GOOD * min((judged.misfit for judged in good), default=0.0)
-    return next((judged for judged in good if judged.misfit <= limit), None)
+def _first_of_best(candidates: Sequence[Candidate]) -> Candidate | None:
+    """Return the first with the fewest doubts that fits about as well as the best of these."""
+    fewest = min((len(each.doubts) for each in candidates), default=0)
+    good = [each for each in candidates if len(each.doubts) == fewest]
+    limit = AS_GOOD * min((each.misfit for each in good), default=0.0)
+    return next((each for each in good if each.misfit <= limit), None)
 
 
-def _judged(sighting: Sighting, place: str) -> Judged:
-    columns = np.flatnonzero(np.isfinite(sighting.rows)).astype(np.float64)
-    rows = sighting.rows[columns.astype(np.intp)]
-    position, height = levelled(columns, rows, sighting.plate, place)
-    outline = Outline(position, height, sighting.plate, elevation=sighting.elevation)
+def _candidate(heap: FoundHeap, place: str) -> Candidate:
+    position, height = levelled(*heap.edge(), heap.plate, place)
+    outline = Outline(position, height, heap.plate, elevation=heap.elevation)
     left, right = fit_flanks(outline, FitSettings.of("flank"), place)
     mean = 0.5 * (left.angle + right.angle)
     se = 0.5 * float(np.hypot(left.se, right.se))
-    # An angle that no grain has does not say that another look would show the heap better.
-    judged = doubts_of(left, right, mean, se, outline, ROUGH_EDGE)
-    found = (doubt for doubt in judged if doubt.name != "range")
-    doubts = (*sighting.doubts, *found)
+    # An unusual angle does not mean that another threshold shows the heap better.
+    doubted = doubts_of(left, right, mean, se, outline, ROUGH_EDGE)
+    doubts = (*heap.doubts, *(doubt for doubt in doubted if doubt.name != "range"))
     lean = abs(left.angle - right.angle) / LARGEST_LEAN
     crooked = relative_misfit(left, right, outline)
     misfit = crooked / LARGEST_MISFIT + lean
     ends = (-left.intercept / left.slope, -right.intercept / right.slope)
-    return Judged(sighting, level_angle(mean, sighting.elevation), doubts, misfit, crooked, ends)
+    return Candidate(heap, level_angle(mean, heap.elevation), doubts, misfit, crooked, ends)

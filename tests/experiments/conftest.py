@@ -1,4 +1,4 @@
-"""Studies and results that the tests of `experiments` share; and `commandline`, which lies beside them."""
+"""Studies, results and helpers (`commandline`, `drawn_heaps`) that the tests of `experiments` share."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dem_warp.clump_fitting import fit_clump
 from experiments.report import solid
 from experiments.studyfile import Study, load_study
 
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "imaging")]
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -49,7 +49,7 @@ def _small_pictures() -> Iterator[None]:
 @pytest.fixture
 def _coarse_clumps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fit clumps with half the samples along a side, an eighth in all, where more would show no more."""
-    for module in ("shapes", "clump_search"):
+    for module in ("clump_maker", "clump_search"):
         monkeypatch.setattr(
             f"experiments.grains.clumps.{module}.fit_clump", partial(fit_clump, resolution=20)
         )

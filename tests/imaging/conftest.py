@@ -1,10 +1,13 @@
-"""A simulated heap that the tests share."""
+"""A simulated heap that the tests share; tests import `drawn_heaps` from this folder."""
 
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 class Heap(NamedTuple):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from imaging import measure
-from imaging.outline import Outline
+from imaging.flank.outline import Outline
+from imaging.flank.plate_line import PlateLine
 from imaging.photo.doubts import LARGEST_CLIFF, LARGEST_ERROR, ROUGH_EDGE, doubts_of, highest_cliff
-from imaging.plate import PlateLine
 
 
 def outline(wing: float, step: float = 30.0, half: float = 150.0) -> Outline:
@@ -63,7 +63,7 @@ def test_a_foot_that_is_missed_leaves_a_cliff(missed: float, side: int) -> None:
     seen = Outline(whole.position, height[::side], whole.plate, photographed=True)
     # the height there is in proportion to the distance from the foot; the blur of an edge is a pixel in 88
     assert highest_cliff(seen) == pytest.approx(missed, abs=0.03)
-    assert any("missed" in str(doubt) for doubt in measure(seen).doubts) == (missed > LARGEST_CLIFF)
+    assert any("missing" in str(doubt) for doubt in measure(seen).doubts) == (missed > LARGEST_CLIFF)
 
 
 def test_a_stray_column_is_no_cliff() -> None:

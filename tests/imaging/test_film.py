@@ -1,4 +1,4 @@
-"""Films: what a picture of moving grains shows, and that other programs read the files."""
+"""Films: pictures of moving grains, in files that other programs read."""
 
 from pathlib import Path
 
@@ -34,7 +34,7 @@ def changed(picture: np.ndarray) -> tuple[float, float, float, float]:
     return (*sides, *heights)
 
 
-def test_spheres_stand_where_they_are() -> None:
+def test_spheres_are_drawn_at_their_places() -> None:
     picture = SCENERY.draw([[0.01, 0.0, 0.02]], [0.004], [0], [], "")
     # A pixel either way.
     assert changed(picture) == pytest.approx((0.006, 0.014, 0.016, 0.024), abs=1.5 * METERS_PER_PIXEL)
@@ -57,7 +57,7 @@ def test_the_time_is_written_above() -> None:
     assert 0.05 < low < high <= 0.06
 
 
-def test_what_is_out_of_the_picture_is_no_error() -> None:
+def test_spheres_outside_the_picture_are_no_error() -> None:
     outside = SCENERY.draw([[0.0, 0.2, 0.01]], [0.004], [0], [square(0.2, 0.3, 0.0, 0.1)], "")
     np.testing.assert_array_equal(outside, empty())
 
@@ -93,7 +93,7 @@ def test_an_mp4_shows_the_pictures(tmp_path: Path, pictures: list[np.ndarray]) -
 
 
 @pytest.mark.parametrize(
-    ("name", "count", "rule"), [("a.avi", 1, "a film ends in"), ("a.gif", 0, "at least one")]
+    ("name", "count", "rule"), [("a.avi", 1, "must end in"), ("a.gif", 0, "at least one")]
 )
 def test_other_films_are_refused(tmp_path: Path, name: str, count: int, rule: str) -> None:
     with pytest.raises(PictureError, match=rule):

@@ -1,4 +1,4 @@
-"""Outlines seen from above, brought to what a level camera sees: bodies of revolution, point by point."""
+"""Outlines seen from above, corrected to those of a level camera: bodies of revolution, point by point."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from imaging import Outline, heap_profile, heap_shape, profile_heights
-from imaging.photo.elevation import level_outline
-from imaging.plate import PlateLine
+from imaging.flank.camera_height import level_outline
+from imaging.flank.plate_line import PlateLine
 
 RADIUS = 100.0
 BODIES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -38,9 +38,8 @@ def outline_from(body: Callable[[np.ndarray], np.ndarray], elevation: float) -> 
     )
 
 
-@pytest.mark.parametrize("name", BODIES)
-@pytest.mark.parametrize("elevation", [5.0, 10.0, 14.0])
-def test_the_camera_height_is_taken_out_of_a_profile(name: str, elevation: float) -> None:
+@pytest.mark.parametrize(("name", "elevation"), [("cone", 5.0), ("round", 10.0), ("hollow", 14.0)])
+def test_a_profile_is_corrected_for_the_camera_height(name: str, elevation: float) -> None:
     x = np.linspace(-RADIUS, RADIUS, 801)
     truth = profile_heights(x, BODIES[name](np.abs(x)))
     seen = outline_from(BODIES[name], elevation)

@@ -7,6 +7,7 @@ import sys
 import cv2
 import numpy as np
 import pytest
+from drawn_heaps import Camera, DrawnHeap, draw
 
 from imaging import (
     PictureError,
@@ -20,7 +21,6 @@ from imaging import (
     snapshot,
 )
 from imaging.drawing import opengl
-from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 from imaging.geometry import Frame, Spheres
 
 
@@ -54,7 +54,7 @@ def test_opposite_views_are_mirror_images(heap) -> None:
 
 def test_raster_and_pyvista_measure_the_same_angle(heap) -> None:
     angles = [
-        heap_angle(heap.centers, heap.radii, azimuths=3, backend=name) for name in ("raster", "pyvista")
+        heap_angle(heap.centers, heap.radii, azimuths=2, backend=name) for name in ("raster", "pyvista")
     ]
     for raster, pyvista in zip(angles[0].views, angles[1].views, strict=True):
         assert (pyvista.left, pyvista.right) == pytest.approx((raster.left, raster.right), abs=0.1)
@@ -83,7 +83,7 @@ def test_lines_are_drawn_where_they_were_measured(heap) -> None:
 
 
 @pytest.mark.parametrize("tilt", [0.0, -4.0])
-def test_a_measurement_lies_in_a_part_where_it_lay_in_the_whole(tilt: float) -> None:
+def test_a_measurement_in_a_part_of_the_picture_is_the_same(tilt: float) -> None:
     image = draw(DrawnHeap(32.0, 30.0, grain=8.0), Camera(plate=(90, 90, 90), tilt=tilt))
     angle = measure(image)
     drawn = overlay(image, angle)
@@ -113,7 +113,7 @@ def test_frame_is_the_same_for_every_azimuth_and_follows_the_heap(heap) -> None:
     assert pictures[0].image.shape == pictures[1].image.shape == frame.shape
 
 
-def test_pyvista_draws_without_a_word(tmp_path) -> None:
+def test_pyvista_draws_without_messages(tmp_path) -> None:
     script = (
         "from imaging import silhouette, snapshot\n"
         "snapshot([[0, 0, 1.0], [1.0, 0, 1.0]], [1.0, 1.0], backend='pyvista')\n"
@@ -150,7 +150,6 @@ def test_pictures_carry_their_scale(heap) -> None:
         ([[0.0, 0.0]], [1.0], "centers"),
         ([[0.0, 0.0, 1.0]], [1.0, 2.0], "radii"),
         ([[0.0, 0.0, 1.0], [0.0, np.nan, 1.0]], [1.0, 1.0], "sphere 1"),
-        ([[0.0, 0.0, 1.0]], [-1.0], "sphere 0"),
         (np.empty((0, 3)), [], "centers"),
     ],
 )
@@ -164,7 +163,7 @@ def test_unknown_backend_is_named(heap) -> None:
         snapshot(heap.centers, heap.radii, backend="opengl")
 
 
-def test_plate_is_found_beside_stray_grains(heap, tmp_path) -> None:
+def test_plate_is_found_next_to_stray_grains(heap, tmp_path) -> None:
     strays = np.array([[-0.045, 0.0, 0.001], [0.046, 0.0, 0.001]])
     centers, radii = np.vstack([heap.centers, strays]), np.r_[heap.radii, 0.001, 0.001]
     picture = snapshot(centers, radii, backend="raster")

@@ -1,10 +1,10 @@
-"""The error of a slope along a rough, curved flank: intervals that hold the truth as often as they say."""
+"""The error of a slope along a rough, curved flank: intervals with the stated coverage."""
 
 import numpy as np
 import pytest
 from scipy import special
 
-from imaging.roughness import slope_error
+from imaging.flank.roughness import slope_error
 
 LINES = 1500
 
@@ -42,7 +42,7 @@ def test_intervals_cover_the_truth(reach: int, curvature: float) -> None:
     assert low <= covered.mean() <= high
 
 
-def test_curvature_is_no_noise() -> None:
+def test_curvature_is_not_noise() -> None:
     along = np.linspace(-1.0, 1.0, 240)
     x, _, (bent,) = lines_of(20.0 * along**2, np.zeros((1, 240)))
     _, _, (rough_one,) = lines_of(0.0 * along, rough(240, 6, 1, seed=1))

@@ -1,15 +1,15 @@
-"""Sharp shadows that a flash throws on the wall beside a heap: taken off, or doubted, never believed."""
+"""Sharp shadows of a flash on the wall next to a heap: removed or doubted."""
 
 import cv2
 import numpy as np
 import pytest
+from drawn_heaps import Camera, DrawnHeap, draw
 
 from imaging import measure
-from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 from imaging.photo.background import contrast_with_background
-from imaging.photo.shade import MOST_SHADED, shaded_edge
-from imaging.photo.sighting import sight
-from imaging.photo.view import View
+from imaging.photo.heap_on_plate import locate_heap
+from imaging.photo.view_settings import View
+from imaging.photo.wall_shadow import MOST_SHADED, shaded_edge
 
 WALL, PLATE, STRAW, COAL = (235, 235, 230), (120, 110, 100), (45, 70, 95), (60, 62, 64)
 ANGLE, WIDTH = 30.0, 400.0
@@ -44,29 +44,27 @@ def in_hard_light(
     return np.clip(np.rint(picture + noise), 0, 255).astype(np.uint8)
 
 
-@pytest.mark.parametrize("sides", [(1,), (-1,), (1, -1)], ids=["right", "left", "both"])
-@pytest.mark.parametrize("aside", [0.2, 0.3])
-@pytest.mark.parametrize("keeps", [0.3, 0.45, 0.6])
+@pytest.mark.parametrize(
+    ("keeps", "aside", "sides"),
+    [(0.3, 0.2, (1,)), (0.6, 0.3, (-1,)), (0.3, 0.3, (1, -1)), (0.6, 0.2, (1, -1))],
+)
 def test_a_sharp_shadow_is_no_part_of_the_heap(keeps: float, aside: float, sides: tuple[int, ...]) -> None:
-    """Taken for the heap's on both sides, it makes the angle 4 degrees flatter at 0.2, and 6 at 0.3."""
+    """As part of the heap on both sides, it makes the angle 4 degrees flatter at 0.2, and 6 at 0.3."""
     angle = measure(in_hard_light(keeps, aside, sides))
     assert angle.doubts == ()
     # The promise for smooth heaps of 400 pixels.
     assert angle.mean == pytest.approx(ANGLE, abs=0.3)
 
 
-@pytest.mark.parametrize("keeps", [0.3, 0.6])
-def test_a_sharp_shadow_hardly_moves_the_angle_of_grains(keeps: float) -> None:
-    lit = measure(in_hard_light(1.0, 0.3, grain=14.0, texture=0.15))
-    angle = measure(in_hard_light(keeps, 0.3, grain=14.0, texture=0.15))
+def test_a_sharp_shadow_hardly_moves_the_angle_of_grains() -> None:
+    lit, angle = (measure(in_hard_light(keeps, 0.3, grain=14.0, texture=0.15)) for keeps in (1.0, 0.3))
     assert angle.doubts == ()
     # Two thirds of the standard error of such grains, .3 degrees.
     assert angle.mean == pytest.approx(lit.mean, abs=0.2)
 
 
-@pytest.mark.parametrize("keeps", [0.45, 0.6])
-@pytest.mark.parametrize("aside", [0.2, 0.3])
-def test_a_shadow_beside_grains_of_the_walls_hue_is_doubted(keeps: float, aside: float) -> None:
+@pytest.mark.parametrize(("keeps", "aside"), [(0.45, 0.2), (0.6, 0.3)])
+def test_a_shadow_next_to_grains_of_the_walls_hue_is_doubted(keeps: float, aside: float) -> None:
     """Coal before a white wall: only its light, .26 of the wall's, tells it from its shadow."""
     angle = measure(in_hard_light(keeps, aside, color=COAL, grain=14.0, texture=0.15))
     assert angle.mean < ANGLE - 2.0
@@ -88,7 +86,7 @@ def test_the_edge_below_a_shadow_is_the_heaps() -> None:
         for keeps in (0.45, 1.0)
     )
     # Well under what the shadow differs by, .55 of the wall's 404.
-    found, bare = (sight(contrast, 60.0, None, View(), "drawn") for contrast in (seen, lit))
+    found, bare = (locate_heap(contrast, 60.0, None, View(), "drawn") for contrast in (seen, lit))
     shaded = shaded_edge(seen, found.rows, found.plate)
     assert shaded.share > MOST_SHADED
     tip = seen.values.shape[1] // 2

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
+from drawn_heaps import Camera, DrawnHeap, draw
 
 from imaging import FitSettings, heap_shape, measure
-from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 
-FLANKS = [(5, 5), (5, 8), (10, 10), (12, 20), (20, 20), (25, 35), (30, 30), (40, 30), (45, 45)]
+FLANKS = [(5, 8), (12, 20), (25, 35), (45, 45)]
 CAMERAS = {
-    "plain": Camera(),
     "noisy": Camera(noise=8),
     "light on dark": Camera(heap=(225, 230, 230), background=(35, 30, 30), noise=5),
     "dark plate": Camera(plate=(60, 60, 60), noise=5),
@@ -29,7 +28,7 @@ def test_both_flanks_within_the_promised_error(width: int, camera: Camera) -> No
         np.testing.assert_allclose([angle.left, angle.right], [left, right], atol=REQUIRED[width], rtol=0)
 
 
-@pytest.mark.parametrize("camera_tilt", [-6.0, -2.0, 3.0, 8.0])
+@pytest.mark.parametrize("camera_tilt", [-2.0, 8.0])
 @pytest.mark.parametrize("plate", [None, (60, 60, 60)], ids=["no plate seen", "plate seen"])
 def test_tilted_camera_is_levelled(camera_tilt: float, plate: tuple[int, int, int] | None) -> None:
     camera = Camera(tilt=camera_tilt, plate=plate, noise=4)

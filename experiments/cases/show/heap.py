@@ -21,8 +21,8 @@ from experiments.cases.workers.workers import Workers
 from experiments.io.errors import InputError
 from experiments.io.files import replacing, write_text
 from experiments.io.program_version import with_version
+from experiments.measurement.case_observables import Observed, observe
 from experiments.measurement.filling import filling_reached
-from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import observables_of

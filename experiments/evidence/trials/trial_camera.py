@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from doe.discrepancy import Calibration
-from experiments.measurement.calibration import usual_calibration
+from experiments.measurement.instrument_error import usual_error
 from experiments.studyfile.observables import BY_NAME
 
 SCALE_ERROR = 0.002
@@ -23,7 +23,7 @@ READING = {"deg": 0.1, "m": 5.0e-5, "1": 0.002}
 def stated_scales(names: Sequence[str]) -> dict[str, Calibration]:
     """Errors of scale that are known of such a camera, by observable that has its scale."""
     shown = [BY_NAME[name] for name in names if BY_NAME[name].by_photograph and BY_NAME[name].unit == "m"]
-    return {one.name: replace(usual_calibration(one), offset=0.0, scale=SCALE_ERROR) for one in shown}
+    return {one.name: replace(usual_error(one), offset=0.0, scale=SCALE_ERROR) for one in shown}
 
 
 @dataclass(frozen=True)

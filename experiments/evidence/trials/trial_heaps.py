@@ -16,7 +16,7 @@ from experiments.evidence.trials.trials_folder import Folder
 from experiments.evidence.trials.truth import Label, read_sealed
 from experiments.io.errors import InputError
 from experiments.io.files import replacing
-from experiments.measurement.calibration import CALIBRATION, NONE
+from experiments.measurement.instrument_error import CALIBRATION, NONE
 from experiments.studyfile.observables import BY_NAME
 
 CLOGGED = "clogged"

@@ -1,1 +1,1 @@
-"""Clumps that stand for a grain's shape."""
+"""Clumps for the shapes of grains."""

@@ -1,4 +1,4 @@
-"""A picture of a clump beside the solid that it was made for."""
+"""Picture of a clump and its solid."""
 
 from __future__ import annotations
 
@@ -14,29 +14,23 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 GRAIN = (0.78, 0.60, 0.38)
-"""Colour."""
+"""Colour, red-green-blue."""
 SUBDIVISIONS = 3
-"""Of the icosahedron that a sphere is drawn as."""
+"""Subdivisions of the icosahedron of a drawn sphere."""
 
 
 def require_picture(path: Path) -> None:
-    """Refuse a picture whose ending names no kind of picture; further errors as by `require_new_file`.
-
-    Raises
-    ------
-    InputError
-        When it does not.
-    """
+    """Refuse a picture with an unknown ending, and one that exists; raise `InputError`."""
     from matplotlib.figure import Figure
 
     known = Figure().canvas.get_supported_filetypes()
     if path.suffix.removeprefix(".").lower() not in known:
-        raise InputError(str(path), f"must be a kind of picture ({', '.join(known)})", path.suffix or "none")
+        raise InputError(str(path), f"must end in one of {', '.join(known)}", path.suffix or "no ending")
     require_new_file(path, "a picture")
 
 
 def draw_clump(path: Path, spheres: np.ndarray, solid: Trimesh | None) -> None:
-    """Draw spheres (n, 4) [m], beside their solid where there is one, seen from the same side."""
+    """Draw spheres (n, 4) [m], and their solid from the same side where there is one."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 4.5) if solid is not None else (4.5, 4.5), dpi=150)
@@ -62,7 +56,6 @@ def draw_clump(path: Path, spheres: np.ndarray, solid: Trimesh | None) -> None:
 
 
 def _mesh_of(spheres: np.ndarray) -> Trimesh:
-    """Surface of every sphere."""
     import trimesh
 
     unit = trimesh.creation.icosphere(subdivisions=SUBDIVISIONS)

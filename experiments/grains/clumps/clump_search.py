@@ -1,4 +1,4 @@
-"""A clump as good as asked for: the fewest spheres with volume, inertia and surface within a tolerance."""
+"""The smallest clump with volume, inertia and surface within a tolerance."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
-"""Numbers of spheres that are tried."""
+"""Tried numbers of spheres."""
 VOLUME_KEPT = 0.01
-"""Error of the volume at which a protrusion is good enough."""
+"""Largest error of the volume with a protrusion that keeps it."""
 MOST_FITS = 5
-"""Fits to find the protrusion of one number of spheres."""
+"""Most fits to find the protrusion of one number of spheres."""
 LARGEST_PROTRUSION = 0.2
-"""Of the solid's longest side."""
+"""Largest protrusion over the solid's longest side."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Quality of a clump of so many spheres."""
+    """Quality of a clump of a number of spheres."""
 
     spheres: int
     """Number of spheres."""
@@ -39,11 +39,11 @@ class Trial:
     surface_distance_mm: float
     """Distance of the surfaces, root mean square [mm]."""
     surface_error: float
-    """The same over the diameter of the sphere of the solid's volume."""
+    """Distance of the surfaces over the diameter of the sphere of the solid's volume."""
 
     @classmethod
     def of(cls, fit: ClumpFit, protrusion: float) -> Trial:
-        """Judge a fit."""
+        """Return the quality of a fit."""
         diameter = float(np.cbrt(6.0 * fit.solid_volume / np.pi))
         distance = fit.surface_distance
         return cls(
@@ -52,19 +52,21 @@ class Trial:
         )  # fmt: skip
 
     def within(self, tolerance: float) -> bool:
-        """Tell that volume, inertia and surface are within a tolerance."""
-        return max(abs(self.volume_error), self.inertia_error, self.surface_error) <= tolerance
+        """Return True if volume, inertia and surface are within a tolerance."""
+        return self.worst <= tolerance
+
+    @property
+    def worst(self) -> float:
+        """Largest of the three errors."""
+        return max(abs(self.volume_error), self.inertia_error, self.surface_error)
 
     def to_dict(self) -> dict[str, Any]:
-        """Values for JSON."""
+        """Return the values for JSON."""
         return asdict(self)
 
 
 def fit_by_volume(solid: Trimesh, sphere_count: int) -> tuple[ClumpFit, float]:
-    """Fit a clump with the protrusion [m] that keeps the solid's volume, and return both.
-
-    The volume grows with the protrusion: secants lead to the root within `MOST_FITS` fits.
-    """
+    """Fit a clump with the protrusion [m] that keeps the solid's volume, by secants; return both."""
     low, limit = 0.0, LARGEST_PROTRUSION * float(solid.extents.max())
     best = fit_clump(solid, sphere_count, low), low
     error = best[0].volume_error
@@ -88,15 +90,14 @@ def fit_by_volume(solid: Trimesh, sphere_count: int) -> tuple[ClumpFit, float]:
 def fit_within(
     solid: Trimesh, tolerance: float, protrusion: float | None, watch: Callable[[Trial], None]
 ) -> tuple[ClumpFit, list[Trial]]:
-    """Fit ever more spheres until a clump is within a tolerance.
+    """Fit more and more spheres until a clump is within a tolerance.
 
     Parameters
     ----------
     solid
         Closed surface [m].
     tolerance
-        Of the volume, of the moments of inertia, and of the surface over the diameter of the sphere of the
-        solid's volume.
+        Largest error, see `Trial`.
     protrusion
         Distance by which a sphere may pass the surface [m]; None: the one that keeps the volume.
     watch
@@ -105,14 +106,14 @@ def fit_within(
     Returns
     -------
     fit
-        The first clump within the tolerance.
+        First clump within the tolerance.
     trials
-        Everything that was tried.
+        All trials.
 
     Raises
     ------
     InputError
-        When none of `COUNTS` is enough.
+        When the largest of `COUNTS` is not enough.
     """
     trials: list[Trial] = []
     for count in COUNTS:
@@ -124,10 +125,9 @@ def fit_within(
         watch(trials[-1])
         if trials[-1].within(tolerance):
             return fit, trials
-    best = min(trials, key=lambda each: max(abs(each.volume_error), each.inertia_error, each.surface_error))
-    rule = f"needs a tolerance that a clump of at most {COUNTS[-1]} spheres keeps, for example with --spheres"
-    received = (
-        f"{tolerance:.1%}; the best, {best.spheres} spheres: volume {best.volume_error:+.1%}, "
-        f"inertia {best.inertia_error:.1%}, surface {best.surface_error:.1%}"
+    best = min(trials, key=lambda each: each.worst)
+    problem = (
+        f"too small for {COUNTS[-1]} spheres: the best clump has {best.spheres} spheres, volume "
+        f"{best.volume_error:+.1%}, inertia {best.inertia_error:.1%}, surface {best.surface_error:.1%}"
     )
-    raise InputError("--tolerance", rule, received)
+    raise InputError("--tolerance", problem, f"{tolerance:.1%}", "Or use --spheres.")

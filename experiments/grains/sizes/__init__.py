@@ -1,1 +1,1 @@
-"""Sizes of grains as they are measured: sieves, image analysers, distributions; and classes of them."""
+"""Measured sizes of grains: sieves, image analysers, distributions, and classes of them."""

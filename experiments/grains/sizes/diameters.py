@@ -1,4 +1,4 @@
-"""Diameters of a grain of any shape, as instruments have them: sieve, Feret, volume-equivalent."""
+"""Diameters of a grain of any shape, by instrument: sieve, Feret, volume-equivalent."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ import numpy as np
 from dem_warp import ClumpShape
 
 STARTS, BEST = 12, 6
-"""Steps of each angle of the turns that are tried, and how many of the best are refined."""
+"""Steps of each angle of the tried rotations, and the number of the best that are refined."""
 
 
 def volume_diameter(shape: ClumpShape) -> float:
-    """Diameter of the sphere of the same volume [m]."""
+    """Return the diameter of the sphere of the same volume [m]."""
     return float(np.cbrt(6.0 * shape.volume / np.pi))
 
 
 @lru_cache(maxsize=64)
 def feret_diameter(shape: ClumpShape) -> float:
-    """Largest Feret diameter: the largest distance between two points of the shape [m]."""
+    """Return the largest Feret diameter: the largest distance between two points of the shape [m]."""
     apart = np.linalg.norm(shape.centers[:, None] - shape.centers[None], axis=2)
     return float((apart + shape.radii[:, None] + shape.radii[None]).max())
 
 
 @lru_cache(maxsize=64)
 def sieve_diameter(shape: ClumpShape) -> float:
-    """Side of the smallest square opening that the shape passes, turned as it likes [m].
+    """Return the side of the smallest square opening that the shape passes in any orientation [m].
 
-    It passes along a line where its shadow along that line lies within the square. A long grain passes end
-    on, and a flat one lies across the diagonal: the side is then below its width.
+    It passes along a line if its shadow along that line is within the square. A long grain passes end on, and
+    a flat one along the diagonal: the side is then below its width.
     """
     if shape.sphere_count == 1:
         return float(2.0 * shape.radii[0])
-    # they take a third of a second to load, and studies are read that have no clump to sieve
+    # they take a third of a second to load, which most studies do not need
     from scipy.optimize import minimize
     from scipy.spatial.transform import Rotation
 
@@ -52,7 +52,7 @@ def sieve_diameter(shape: ClumpShape) -> float:
 
 
 def _widths(shape: ClumpShape, directions: np.ndarray) -> np.ndarray:
-    """Widths of a shape along unit vectors, (k, 3), [m]."""
+    """Return the widths of a shape along unit vectors (k, 3) [m]."""
     along = shape.centers @ directions.T
     radii = shape.radii[:, None]
     return (along + radii).max(axis=0) - (along - radii).min(axis=0)
@@ -63,4 +63,4 @@ DIAMETERS: Mapping[str, Callable[[ClumpShape], float]] = {
     "feret": feret_diameter,
     "volume": volume_diameter,
 }
-"""Diameters by the names that a study has for them."""
+"""Diameters by their names in studies."""

@@ -1,4 +1,4 @@
-"""Distributions of a diameter, by number or by volume: of a table, and of a formula."""
+"""Distributions of a diameter, by number or by volume, from a table or a formula."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ NODES = 64
 
 
 class Distribution(Protocol):
-    """Cumulative distribution of a diameter [m], its share counted from 0 to 1 from the smallest on."""
+    """Cumulative distribution of a diameter [m]; shares go from 0 to 1 with the diameter."""
 
     def quantile(self, share: float) -> float:
-        """Diameter below which a share lies [m]."""
+        """Return the diameter [m] of a share."""
         ...
 
     def moment(self, power: int, low: float, high: float) -> float:
-        """Integral of a power of the diameter over the shares between two [m^power]."""
+        """Integrate a power of the diameter over the shares between two [m^power]."""
         ...
 
 
 @dataclass(frozen=True)
 class Tabulated:
-    """Shares between diameters; within an interval the cumulative share is straight over the logarithm.
+    """Shares between diameters; within an interval the cumulative share is linear in the logarithm.
 
-    An interval of no width is a share of one diameter.
+    An interval without width is a share of one diameter.
     """
 
     lows: tuple[float, ...]
     highs: tuple[float, ...]
     """Ends of the intervals, rising [m]."""
     shares: tuple[float, ...]
-    """Share of each, together 1."""
+    """Share of each interval; the sum is 1."""
 
     @cached_property
     def _below(self) -> np.ndarray:
@@ -43,12 +43,12 @@ class Tabulated:
         return np.concatenate([[0.0], np.cumsum(self.shares)]) / sum(self.shares)
 
     def quantile(self, share: float) -> float:
-        """Diameter below which a share lies [m]."""
+        """Return the diameter [m] of a share."""
         place = int(np.clip(np.searchsorted(self._below, share, side="left") - 1, 0, len(self.shares) - 1))
         return self._diameter(place, share)
 
     def moment(self, power: int, low: float, high: float) -> float:
-        """Integral of a power of the diameter over the shares between two [m^power]."""
+        """Integrate a power of the diameter over the shares between two [m^power]."""
         total = 0.0
         for place in range(len(self.shares)):
             start, end = max(low, self._below[place]), min(high, self._below[place + 1])
@@ -66,7 +66,7 @@ class Tabulated:
 
 
 def _mean_power(low: float, high: float, power: int) -> float:
-    """Mean of a power of a diameter that is spread evenly over the logarithm."""
+    """Return the mean of a power of a diameter with an evenly distributed logarithm."""
     if high <= low * (1.0 + 1e-12):
         return low**power
     return float((high**power - low**power) / (power * np.log(high / low)))
@@ -74,16 +74,16 @@ def _mean_power(low: float, high: float, power: int) -> float:
 
 @dataclass(frozen=True)
 class Continuous:
-    """Distribution of a formula: one of ``scipy.stats``, frozen."""
+    """Frozen distribution of ``scipy.stats``."""
 
     law: Any
 
     def quantile(self, share: float) -> float:
-        """Diameter below which a share lies [m]."""
+        """Return the diameter [m] of a share."""
         return float(self.law.ppf(share))
 
     def moment(self, power: int, low: float, high: float) -> float:
-        """Integral of a power of the diameter over the shares between two [m^power]."""
+        """Integrate a power of the diameter over the shares between two [m^power]."""
         nodes, weights = np.polynomial.legendre.leggauss(NODES)
         if low > 0.0 and high < 1.0:
             # over the diameter, where the density is smooth

@@ -1,21 +1,21 @@
-"""A file of spheres read, whatever its format."""
+"""Reading of a file of spheres in any format."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from experiments.grains.spheres.library import FORMATS
 from experiments.grains.spheres.sphere_file import LARGEST, Format, SphereFile
+from experiments.grains.spheres.sphere_formats import FORMATS
 from experiments.io.errors import InputError
 from experiments.io.files import check_file
 from experiments.io.texts import decoded
 
 HEAD = 65536
-"""First bytes of a file that tell its format."""
+"""Number of first bytes of a file that show its format."""
 
 
 def format_of(path: Path) -> Format | None:
-    """Find the format of a file by its content; None where it is none of `FORMATS`.
+    """Find the format of a file by its content; None if it has none of `FORMATS`.
 
     Raises
     ------
@@ -27,23 +27,23 @@ def format_of(path: Path) -> Format | None:
         with path.open("rb") as file:
             data = file.read(HEAD)
     except OSError as error:
-        raise InputError(str(path), "must be a readable file", error.strerror or str(error)) from None
+        raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
     head = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     binary_vtk = head.startswith("# vtk DataFile") or "<VTKFile" in head[:4096]
     if "\0" in head and not binary_vtk:
         return None
-    # A format looks at whole lines.
+    # A format needs complete lines.
     whole = head if len(data) < HEAD else head.rpartition("\n")[0]
     return next((each for each in FORMATS if each.recognises(whole)), None)
 
 
 def read_spheres(path: Path) -> SphereFile:
-    """Read a file of spheres in the format that its content shows.
+    """Read a file of spheres in the format of its content.
 
     Raises
     ------
     InputError
-        When there is no such file, it has none of the formats, or breaks a rule of its own.
+        When there is no such file, it has none of the formats, or is invalid.
     """
     found = format_of(path)
     if found is not None:
@@ -51,4 +51,4 @@ def read_spheres(path: Path) -> SphereFile:
     with path.open("rb") as file:
         decoded(file.read(HEAD), str(path))
     known = "; ".join(each.name for each in FORMATS)
-    raise InputError(str(path), f"needs a file of spheres ({known})", "none of these")
+    raise InputError(str(path), f"not a file of spheres ({known})")

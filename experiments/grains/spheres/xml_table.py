@@ -1,7 +1,7 @@
-"""XML with an element for each sphere: x, y, z and radius as attributes or as elements inside.
+"""XML with an element for each sphere: x, y, z and radius as attributes or inner elements.
 
-EDEM and others keep particle shapes like this, each under names of its own; names are read as a table's.
-No file of EDEM itself was at hand to test this with.
+EDEM and others store particle shapes like this, with different names, which are read like a table's (not
+tested with a file of EDEM itself).
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
+from experiments.grains.spheres.column_table import column_kind
 from experiments.grains.spheres.sphere_file import LARGEST, Columns, Format, SphereFile, spheres_of
-from experiments.grains.spheres.table import column_kind
 from experiments.io.errors import InputError
 from experiments.io.texts import read_text
 from experiments.io.units import UNITS
@@ -27,15 +27,15 @@ def _recognises(head: str) -> bool:
 def _read(path: Path) -> SphereFile:
     text = read_text(path, LARGEST)
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text):
-        raise InputError(str(path), "expected XML without a document type and entities", "one with them")
+        raise InputError(str(path), "XML with a document type or entities is not read")
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise InputError(str(path), "needs well-formed XML", str(error)) from None
+        raise InputError(str(path), f"not well-formed XML: {error}") from None
     found = list(_spheres(root))
     sizes = {"r" if "r" in entries else "d" for entries in found}
     if len(sizes) > 1:
-        raise InputError(str(path), "expected all spheres have a radius, or all a diameter", "some of each")
+        raise InputError(str(path), "either all spheres must have a radius, or all a diameter")
     size = next(iter(sizes), "r")
     rows = ((n, [entries[kind] for kind in (*_NEEDED, size)]) for n, entries in enumerate(found, start=1))
     try:
@@ -45,14 +45,14 @@ def _read(path: Path) -> SphereFile:
     named = {element.get(key) for element in root.iter() for key in ("unit", "units") if element.get(key)}
     lengths = [name for name in named if name in UNITS["length"]]
     if len(lengths) > 1:
-        raise InputError(str(path), "expected one unit of length", ", ".join(sorted(lengths)))
+        raise InputError(str(path), "must have only one unit of length", ", ".join(sorted(lengths)))
     return SphereFile(
         "XML with an element for each sphere", spheres, unit=UNITS["length"][lengths[0]] if lengths else None
     )
 
 
 def _spheres(element: ElementTree.Element) -> Iterator[dict[str, str]]:
-    """Entries of every innermost element that has x, y, z and a size, in order."""
+    """Yield the entries of every innermost element with x, y, z and a size, in order."""
     inner = [sphere for child in element for sphere in _spheres(child)]
     if inner:
         yield from inner

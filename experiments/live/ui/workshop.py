@@ -15,14 +15,18 @@ from typing import Any
 import numpy as np
 
 from dem_warp import SCENES
-from experiments.grains.clumps.shapes import ClumpRequest, make_clump, write_clump
+from experiments.grains.clumps.clump_maker import ClumpRequest, make_clump, write_clump
 from experiments.io.errors import InputError, Problem
 from experiments.io.files import replacing, write_text
 from experiments.io.toml_files import read_toml, toml_text
 from experiments.io.units import read_quantity, read_share
 from experiments.live.folder import inside
-from experiments.measurement.photographs import mean_angle, measure_pictures
-from experiments.measurement.pictures import find_pictures
+from experiments.measurement.photographs import (
+    PictureOptions,
+    find_pictures,
+    mean_angle,
+    measure_pictures,
+)
 from experiments.studyfile import Study, load_study, study_scales
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.new_study import TEMPLATE, new_study_path
@@ -141,7 +145,7 @@ class Workshop:
         return {
             "facts": made.to_dict(density),
             "advice": made.advice,
-            "told": made.told,
+            "told": made.description,
             "spheres": np.column_stack([spheres, np.zeros(len(spheres))]).ravel().tolist(),
             "faces": [] if made.solid is None else _faces(made.solid),
             "command": self.clump_command(asked),
@@ -162,7 +166,7 @@ class Workshop:
             As by the command.
         """
         pictures = find_pictures(self._plain(folder), self.folder, "pictures")
-        rows = measure_pictures(pictures, fit)
+        rows = measure_pictures(pictures, PictureOptions(fit))
         mean = mean_angle(rows)
         names = [f"{folder}/{path.name}" for path in pictures]
         return {

@@ -13,7 +13,7 @@ from experiments.calibrate import Campaign, Outcome, calibrate
 from experiments.measurement.profiles import with_profiles
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import OUTLINE
-from imaging.profile import STATIONS, profile_heights
+from imaging.flank.heap_shape import STATIONS, profile_heights
 
 ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 ROLLING = """

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from dem_warp import CaseResult
 from experiments.cases import Heap, write_heap
-from experiments.measurement.states import observe
+from experiments.measurement.case_observables import observe
 from experiments.studyfile import Study
 
 COUNT = 6

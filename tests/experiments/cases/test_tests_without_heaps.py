@@ -19,8 +19,8 @@ from experiments.discover.search import Search
 from experiments.export import ExportedTest
 from experiments.io.errors import InputError, StudyError
 from experiments.measurement.measured_file import read_measured
+from experiments.measurement.measured_template import write_measured_template
 from experiments.measurement.target import with_measurements
-from experiments.measurement.template import write_measured_template
 from experiments.studyfile import Study, load_study
 
 WriteStudy = Callable[..., Path]

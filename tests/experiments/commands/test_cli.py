@@ -321,7 +321,7 @@ def test_a_photograph_given_twice_has_its_rows_and_is_no_target() -> None:
         (("--crop", "1,2,3"), "--crop"),
         (("--crop", "10,10,5,20"), "left < right"),
         (("--plate", "a,b,c,d"), "--plate"),
-        (("--heap", "0"), "counted from 1"),
+        (("--heap", "0"), "must be 1 or more"),
         (("--elevation", "70"), "elevation"),
         (("--by", "name"), "--by"),
         (("--overlay", "a.png"), "--overlay"),

@@ -78,32 +78,40 @@ def test_a_tolerance_takes_the_first_number_of_spheres_that_keeps_it() -> None:
 @pytest.mark.usefixtures("_coarse_clumps")
 def test_a_tolerance_that_no_clump_keeps_names_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.grains.clumps.clump_search.COUNTS", (1, 2))
-    with pytest.raises(InputError, match=r"at most 2 spheres .*the best, 2 spheres: volume [+-]"):
+    with pytest.raises(
+        InputError, match=r"too small for 2 spheres: the best clump has 2 spheres, volume [+-]"
+    ):
         fit_within(parse_solid("tri-pyramid:6x4"), 0.01, 0.0, lambda trial: None)
 
 
 @pytest.mark.usefixtures("_coarse_clumps")
-def test_a_person_is_told_how_the_fit_goes_and_what_to_do() -> None:
+def test_trials_and_advice_are_printed() -> None:
     code, out, err = dem_warp("clump", "ellipsoid:6x3x3", "--tolerance", "25%", "--json")
     assert code == 0
     trials = json.loads(out)["trials"]
     assert [line.split()[0] for line in err.splitlines()] == [str(trial["spheres"]) for trial in trials]
     code, _, err = dem_warp("clump", "tri-pyramid:6x4", "--spheres", 2)
     assert code == 0
-    assert "% less volume, and mass, than the solid: --protrusion auto" in err
+    assert "% less volume and mass than the solid: --protrusion auto" in err
     code, _, err = dem_warp("clump", "tri-pyramid:6x4", "--spheres", 2, "--protrusion", "auto")
     assert "Advice" not in err
 
 
 @pytest.mark.usefixtures("_coarse_clumps")
-def test_a_clump_is_drawn_beside_its_solid_and_never_over_a_file() -> None:
+def test_a_clump_is_drawn_with_its_solid_and_never_over_a_file() -> None:
     die(1.0)
     command = ("clump", "die.stl", "--spheres", 1)
     assert dem_warp(*command, "--picture", "die.png")[0] == 0
     picture = Path("die.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
-    for name, rule in (("die.png", "never overwrites"), ("die.docx", "kind of picture")):
+    for name, rule in (("die.png", "never overwrites"), ("die.docx", "must end in one of")):
         code, _, err = dem_warp(*command, "--picture", name)
         assert (code, rule in err) == (2, True)
     assert Path("die.png").read_bytes() == picture
     assert sorted(path.name for path in Path().iterdir()) == ["die.png", "die.stl"]
+
+
+def test_a_missing_file_is_named() -> None:
+    code, out, err = dem_warp("clump", "nosuch.stl", "--spheres", 3)
+    assert (code, out) == (2, "")
+    assert "nosuch.stl: no such file" in err

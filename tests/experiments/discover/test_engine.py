@@ -17,7 +17,7 @@ from experiments.discover import wave
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
 from experiments.io.errors import StoreError
-from experiments.measurement.states import measure
+from experiments.measurement.case_observables import measure
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import NAMES
 

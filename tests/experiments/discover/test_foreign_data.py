@@ -38,7 +38,7 @@ from doe.discrepancy.fitting.size_interval import coded_size_interval
 from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
 from doe.discrepancy.verdict.records import calibration_uses
 from experiments.discover.search import Search
-from experiments.measurement.calibration import usual_calibration
+from experiments.measurement.instrument_error import usual_error
 from experiments.measurement.measured_file import read_measured
 from experiments.studyfile import load_study
 from experiments.studyfile.observables import BY_NAME
@@ -200,7 +200,7 @@ def test_what_is_off_alike_everywhere_is_allowed_where_the_file_states_it() -> N
 
 
 def test_a_calibration_error_hides_no_effect_that_looks_otherwise() -> None:
-    calibration = {name: usual_calibration(BY_NAME[name]) for name in known().observables}
+    calibration = {name: usual_error(BY_NAME[name]) for name in known().observables}
     seen = [base_p(replace(heaps({"plate_tilt": 0.8}, seed), calibration=calibration)) for seed in range(4)]
     # a tilt of five degrees leans by several standard deviations of the mean in every condition
     assert max(seen) < 0.025

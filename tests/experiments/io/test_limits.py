@@ -28,7 +28,7 @@ from experiments.measurement.target import with_measurements
 from experiments.runs.campaign import check_runs
 from experiments.studyfile import load_study
 from imaging import PictureError, measure_photograph
-from imaging.pictures import read_picture
+from imaging.photo.picture_file import read_picture
 
 WriteStudy = Callable[..., Path]
 

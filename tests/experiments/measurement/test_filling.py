@@ -1,4 +1,4 @@
-"""The filling of a drum as it was reached: told of a case, and cautioned of in a campaign."""
+"""The reached filling of a drum: printed for a case, and cautioned about in a campaign."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from commandline import dem_warp
 
 from dem_warp import Drum, Material
-from experiments.measurement.filling import filling_missed, filling_reached, filling_told
+from experiments.measurement.filling import filling_missed, filling_reached, filling_text
 from experiments.report.cautions import _filling
 from experiments.studyfile import load_study
 
@@ -39,16 +39,16 @@ def test_a_bed_up_to_the_axis_fills_half_of_a_drum() -> None:
     assert filling_reached(SimpleNamespace(filling=0.4), {"fill_height": 0.05}) is None
 
 
-def test_a_filling_that_is_not_the_stated_one_is_missed_unless_grains_are_counted() -> None:
+def test_another_filling_is_missed_unless_grains_are_counted() -> None:
     assert filling_missed(DRUM, 0.33)
     assert not filling_missed(DRUM, 0.39)
-    assert filling_told(DRUM, 0.331) == "0.33 of the drum, 0.4 stated"
+    assert filling_text(DRUM, 0.331) == "0.33 of the drum, 0.4 in the study"
     counted = replace(DRUM, grain_count=100)
     assert not filling_missed(counted, 0.33)
-    assert filling_told(counted, 0.331) == "0.33 of the drum"
+    assert filling_text(counted, 0.331) == "0.33 of the drum"
 
 
-def test_a_drums_own_filling_is_told(write_study: Callable[..., Path], tmp_path: Path) -> None:
+def test_the_filling_of_a_drum_is_printed(write_study: Callable[..., Path], tmp_path: Path) -> None:
     study = write_study((TUBE, SCENE), (ANGLE, ""))
     words = ("heap", study, "--device", "cpu", "--out")
     code, out, _ = dem_warp(*words, tmp_path / "a", "--json")
@@ -59,10 +59,10 @@ def test_a_drums_own_filling_is_told(write_study: Callable[..., Path], tmp_path:
     # The rain heaps up in the middle, and what stands above the brim is struck off.
     assert 0.2 < found["filling"] < 0.4
     _, out, _ = dem_warp(*words, tmp_path / "b")
-    assert out.splitlines()[-1] == f"filling: {found['filling']:.2f} of the drum, 0.4 stated"
+    assert out.splitlines()[-1] == f"filling: {found['filling']:.2f} of the drum, 0.4 in the study"
 
 
-def test_a_campaign_of_drums_that_were_filled_otherwise_is_cautioned(
+def test_another_filling_is_a_caution_of_a_campaign(
     write_study: Callable[..., Path],
 ) -> None:
     study = load_study(write_study((TUBE, SCENE), (ANGLE, "")))
@@ -70,4 +70,4 @@ def test_a_campaign_of_drums_that_were_filled_otherwise_is_cautioned(
         cases = pd.DataFrame({"scene": ["target"] * 3, "fill_height": [height] * 3})
         texts = [caution.text for caution in _filling(SimpleNamespace(cases=cases), study)]
         assert len(texts) == cautioned
-        assert all("0.4 stated" in text for text in texts)
+        assert all("0.4 in the study" in text for text in texts)

@@ -26,7 +26,7 @@ from experiments.cases.store.outputs import LIST, sha256_of
 from experiments.cases.workers import own
 from experiments.discover.search import Search
 from experiments.io.errors import InputError
-from experiments.measurement.states import Observed
+from experiments.measurement.case_observables import Observed
 from experiments.runs import campaign as run
 from experiments.runs.campaign import Desk
 from experiments.runs.lasting import BANK, OUTCOMES

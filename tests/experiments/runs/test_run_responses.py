@@ -20,7 +20,7 @@ from experiments.calibrate import Outcome
 from experiments.cases import OwnWorkers, Store, execute, run_cases
 from experiments.cases.workers import own
 from experiments.cli import app
-from experiments.measurement.states import Observed
+from experiments.measurement.case_observables import Observed
 from experiments.runs import campaign as run
 from experiments.runs.campaign import Desk, check_runs
 from experiments.studyfile import Study, load_study

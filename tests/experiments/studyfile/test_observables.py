@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dem_warp import CaseResult, Drum, LiftedCylinder
-from experiments.measurement.states import measure, observe
+from experiments.measurement.case_observables import measure, observe
 from experiments.studyfile.observables import (
     BY_NAME,
     NAMES,

@@ -15,7 +15,7 @@ from experiments.cases import Store, execute, run_cases
 from experiments.cases.workers import own
 from experiments.io.errors import StudyError
 from experiments.io.units import UNITS
-from experiments.measurement.states import Observed
+from experiments.measurement.case_observables import Observed
 from experiments.studyfile import BUCKWHEAT, load_study
 from experiments.studyfile.campaign import Response, Target, Twin
 from experiments.studyfile.observables import DIMENSIONS

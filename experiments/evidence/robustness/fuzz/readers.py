@@ -34,12 +34,12 @@ from doe import DesignError
 from doe.discrepancy import Bank, MechanismRange, SearchSpace, fitted, load_bank
 from experiments.cases import Store
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.grains.clumps.shapes import ClumpRequest, make_clump
+from experiments.grains.clumps.clump_maker import ClumpRequest, make_clump
 from experiments.io.errors import InputError
 from experiments.journal.glimpses import Glimpses, read_glimpse
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.plausible import SizeOfTest
 from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
+from experiments.measurement.value_limits import ValueLimits
 from experiments.studyfile import load_study
 from imaging import PictureError, measure_photograph
 
@@ -120,7 +120,7 @@ def profiles(folder: Path) -> Reader:
     def read(path: Path) -> object:
         if path.name.startswith("drum"):
             return read_drum_profiles(path, 0.03)
-        return read_heap_profiles(path, "flank", SizeOfTest(1e-4, 0.2, math.inf))
+        return read_heap_profiles(path, "flank", ValueLimits(1e-4, 0.2, math.inf))
 
     return Reader({name: text.encode() for name, text in texts.items()}, read)
 

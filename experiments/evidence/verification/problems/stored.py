@@ -8,7 +8,7 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, simulate
 from experiments.cases import Store
-from experiments.measurement.states import measure_heap
+from experiments.measurement.case_observables import measure_heap
 from experiments.studyfile import Study
 from imaging import PictureError
 

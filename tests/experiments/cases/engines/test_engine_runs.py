@@ -25,7 +25,7 @@ from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cli import app
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
-from experiments.measurement.states import measure
+from experiments.measurement.case_observables import measure
 from experiments.studyfile import load_study
 from experiments.studyfile.observables import PHOTOGRAPHED
 

@@ -14,7 +14,7 @@ import pytest
 from dem_warp import Case, CaseResult
 from experiments.cases import execute
 from experiments.cases.workers import own
-from experiments.measurement.states import Observed
+from experiments.measurement.case_observables import Observed
 from experiments.studies.buckwheat import climb, screening, surface, verification
 
 TARGET = 30.148

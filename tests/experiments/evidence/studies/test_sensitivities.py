@@ -21,7 +21,7 @@ from experiments.evidence.studies.buckwheat.sensitivity import __main__ as sensi
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.evidence.studies.buckwheat.sensitivity.variants import BASE, chosen_variants, variants
 from experiments.io.errors import InputError, StoreError
-from experiments.measurement.states import Observed
+from experiments.measurement.case_observables import Observed
 from experiments.studyfile.study import MeasurementSection
 
 FREE = {"base", "fit-middle", "fit-lower", "fit-upper", "two-views"}

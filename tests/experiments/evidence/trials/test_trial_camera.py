@@ -11,7 +11,7 @@ from experiments.evidence.trials.declaration import declared_effects
 from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS, VIEWS
 from experiments.evidence.trials.trial_camera import Camera
 from experiments.studyfile.observables import BY_NAME, NAMES, OUTLINE, PHOTOGRAPHED
-from imaging.profile import profile_heights
+from imaging.flank.heap_shape import profile_heights
 
 
 class Steady(np.random.Generator):

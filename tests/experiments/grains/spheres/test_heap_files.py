@@ -1,7 +1,7 @@
-"""Heaps that LIGGGHTS, LAMMPS and Yade left, measured by the code that measures dem-warp's own.
+"""Heaps of LIGGGHTS, LAMMPS and Yade, measured like dem-warp's own.
 
 The files under ``data`` were written by LIGGGHTS-PUBLIC 3.8.0, LAMMPS and Yade 2023.02a of Debian 12 with the
-scripts beside them.
+scripts there.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def test_the_angle_is_that_of_the_spheres_on_the_plate_of_the_script() -> None:
     assert "frame 2 of 2 (timestep 20000)" in found["source"]
 
 
-def test_the_unit_leaves_the_angle_and_scales_what_is_told(tmp_path: Path) -> None:
+def test_the_unit_scales_the_radii_and_not_the_angle(tmp_path: Path) -> None:
     [metres] = measured(DATA / "yade_clumps.txt", "--overlay", tmp_path / "drawn")
     assert Path(metres["overlay"]).stat().st_size > 1000
     [millimetres] = measured(DATA / "yade_clumps.txt", "--unit", "mm")
@@ -72,7 +72,7 @@ def test_the_unit_leaves_the_angle_and_scales_what_is_told(tmp_path: Path) -> No
     assert "0.0012 to 0.0015 mm radius in 208 grains" in millimetres["source"]
 
 
-def test_grains_beside_the_plate_do_not_count() -> None:
+def test_grains_next_to_the_plate_do_not_count() -> None:
     spheres = read_spheres(DATA / "yade_spheres.txt").spheres
     fallen = int((spheres[:, 2] < 0.0).sum())
     assert fallen > 0
@@ -80,15 +80,15 @@ def test_grains_beside_the_plate_do_not_count() -> None:
     assert f"{fallen} below it left out" in row["source"]
 
 
-def test_a_cut_dump_gives_its_last_whole_frame(tmp_path: Path) -> None:
+def test_a_cut_dump_gives_its_last_complete_frame(tmp_path: Path) -> None:
     text = (DATA / "liggghts_spheres.dump").read_text("utf-8")
     cut = tmp_path / "cut.dump"
     cut.write_text(text[: int(0.9 * len(text))], "utf-8")
     read = read_spheres(cut)
-    assert read.told.endswith("frame 1 of 2 (timestep 10000), the last whole one")
+    assert read.description.endswith("frame 1 of 2 (timestep 10000), the last complete one")
     assert len(read.spheres) == 280
     cut.write_text(text[:1000], "utf-8")
-    with pytest.raises(InputError, match="none that is whole"):
+    with pytest.raises(InputError, match="no complete frame"):
         read_spheres(cut)
 
 
@@ -141,7 +141,7 @@ def dump_with(line: str, replacement: str) -> str:
         ),
         (
             dump_with("ITEM: BOX BOUNDS ff ff ff", "ITEM: BOX BOUNDS xy xz yz ff ff ff"),
-            "a tilted box are not read",
+            "a tilted box are not supported",
             "line 1",
         ),
         (

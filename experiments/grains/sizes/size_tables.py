@@ -1,0 +1,183 @@
+"""Tables of sizes: sieve analyses, and counts of an image analyser."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+from experiments.grains.sizes.distribution import Tabulated
+from experiments.io.errors import InputError
+from experiments.io.rows import Row, read_rows
+from experiments.io.texts import read_text
+from experiments.io.units import Quantity
+
+ROUNDING = 0.5
+"""Largest deviation of a sum of rounded percentages from 100 [%]."""
+
+_MESH_NUMBER = re.compile(r'^ *"?(#\d+)"? *[,;\t] *"?[\d.]', re.MULTILINE)
+
+SIEVE_COLUMNS = ("opening", "retained", "retained_percent", "passing_percent")
+COUNT_COLUMNS = ("diameter", "from", "to", "count")
+
+
+def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
+    """Read a sieve analysis with one sieve per row, the finest first.
+
+    Columns: ``opening``, and one of ``retained`` (mass on the sieve), ``retained_percent`` and
+    ``passing_percent``. The opening of a pan is 0. ``unit`` is that of openings without one.
+
+    Returns
+    -------
+    distribution
+        Distribution by mass, between the finest and the coarsest opening.
+    unaccounted
+        Part of the mass beyond them: in the pan, and on the coarsest sieve.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or is invalid, with the row.
+    """
+    _refuse_mesh_numbers(path)
+    rows = list(read_rows(path, ("opening",), SIEVE_COLUMNS))
+    column = _one_of(path, rows, SIEVE_COLUMNS[1:])
+    _at_least(path, rows, 2)
+    openings = [_length(row, "opening", unit, zero=True) for row in rows]
+    for row, (finer, coarser) in zip(rows[1:], pairwise(openings), strict=True):
+        if not coarser > finer:
+            raise row.error("must rise from row to row, with the finest sieve or the pan first", "opening")
+    values = [_number(row, column, "mass" if column == "retained" else "") for row in rows]
+    _one_kind(rows, column)
+    if column == "passing_percent":
+        on_each, total = _from_passing(rows, values), 100.0
+    else:
+        on_each, total = values, sum(values)
+        if column == "retained_percent" and abs(total - 100.0) > ROUNDING:
+            problem = f"must add up to 100 within {ROUNDING:g}"
+            raise InputError(f"{path}: retained_percent", problem, f"{total:g}")
+    # grains on a sieve are larger than its opening, and smaller than the next
+    sieves = zip(openings, openings[1:], on_each, strict=False)
+    between = [(low, high, on) for low, high, on in sieves if low > 0.0]
+    kept = sum(on for *_, on in between)
+    if not kept > 0.0:
+        raise InputError(f"{path}: {column}", "must have mass between two sieves", f"{kept:g}")
+    return _tabulated(between, kept), 1.0 - kept / total
+
+
+def _refuse_mesh_numbers(path: Path) -> None:
+    """Refuse rows that begin with the number of a mesh, e.g. ``#40``, which look like comments."""
+    text = read_text(path)
+    if found := _MESH_NUMBER.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        problem = "needs a length with its unit, e.g. 0.425 mm, not the number of a mesh"
+        raise InputError(f"{path}:{line}: opening", problem, found[1])
+
+
+def read_counts(path: Path, unit: str | None = None) -> Tabulated:
+    """Read counts of an image analyser with one grain or one class per row.
+
+    Columns: ``diameter``, with or without ``count``; or ``from``, ``to`` and ``count``. ``count`` may be any
+    share: a number, a volume. ``unit`` is that of diameters without one.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or is invalid, with the row.
+    """
+    rows = list(read_rows(path, (), COUNT_COLUMNS))
+    _at_least(path, rows, 1)
+    if "diameter" in rows[0].cells:
+        if both := [name for name in ("from", "to") if name in rows[0].cells]:
+            problem = "must have a column diameter, or from, to and count, not both"
+            raise InputError(str(path), problem, f"diameter and {', '.join(both)}")
+        found = [(_length(row, "diameter", unit), _count(row)) for row in rows]
+        between = [(diameter, diameter, share) for diameter, share in sorted(found)]
+    else:
+        if missing := [name for name in ("from", "to", "count") if name not in rows[0].cells]:
+            problem = f"needs a column diameter, or from, to and count; missing: {', '.join(missing)}"
+            raise InputError(str(path), problem, ", ".join(rows[0].cells))
+        between = [_class(row, unit) for row in rows]
+        for row, (before, after) in zip(rows[1:], pairwise(between), strict=True):
+            if after[0] < before[1]:
+                raise row.error("must not be below the class of the row before", "from")
+    total = sum(share for *_, share in between)
+    if not total > 0.0:
+        raise InputError(f"{path}: count", "must count at least one grain", f"{total:g}")
+    return _tabulated([each for each in between if each[2] > 0.0], total)
+
+
+def _tabulated(between: Sequence[tuple[float, float, float]], total: float) -> Tabulated:
+    lows, highs, shares = zip(*(each for each in between if each[2] > 0.0), strict=True)
+    return Tabulated(lows, highs, tuple(share / total for share in shares))
+
+
+def _from_passing(rows: Sequence[Row], passing: Sequence[float]) -> list[float]:
+    for row, value in zip(rows, passing, strict=True):
+        if value > 100.0:
+            raise row.error("must be at most 100", "passing_percent")
+    if 0.0 < max(passing) <= 1.0:
+        raise rows[-1].error("must be percent, from 0 to 100, not parts of 1", "passing_percent")
+    for row, (finer, coarser) in zip(rows[1:], pairwise(passing), strict=True):
+        if coarser < finer:
+            raise row.error("must rise with the opening", "passing_percent")
+    return [coarser - finer for finer, coarser in pairwise([*passing, 100.0])]
+
+
+def _class(row: Row, unit: str | None) -> tuple[float, float, float]:
+    low, high = _length(row, "from", unit), _length(row, "to", unit)
+    if not high > low:
+        raise row.error(f"must be above from, {row['from']}", "to")
+    return low, high, _count(row)
+
+
+def _count(row: Row) -> float:
+    return 1.0 if "count" not in row.cells else _number(row, "count", "")
+
+
+def _length(row: Row, column: str, unit: str | None, zero: bool = False) -> float:
+    """Read a diameter [m]; it may be 0 only where `zero` allows it."""
+    try:
+        quantity = Quantity.parse(row[column])
+        if zero and quantity.number == 0.0:
+            return 0.0
+        value = Quantity(quantity.number, quantity.unit or unit or "").to_base("length")
+    except ValueError as error:
+        raise row.error(f"{error}; or write the unit of the table in the study", column) from None
+    if not value > 0.0:
+        raise row.error("must be positive", column)
+    return value
+
+
+def _number(row: Row, column: str, dimension: str) -> float:
+    try:
+        quantity = Quantity.parse(row[column])
+        value = quantity.to_base(dimension) if quantity.unit else quantity.number
+    except ValueError as error:
+        raise row.error(str(error), column) from None
+    if not (value >= 0.0 and math.isfinite(value)):
+        raise row.error("must be 0 or more", column)
+    return value
+
+
+def _one_kind(rows: Sequence[Row], column: str) -> None:
+    """Refuse a column with a unit in some rows only."""
+    bare = [not Quantity.parse(row[column]).unit for row in rows]
+    for row, without in zip(rows, bare, strict=True):
+        if without and not all(bare) and Quantity.parse(row[column]).number != 0.0:
+            raise row.error("needs a unit like the other rows", column)
+
+
+def _one_of(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> str:
+    found = [name for name in columns if rows and name in rows[0].cells]
+    if len(found) != 1:
+        raise InputError(str(path), f"needs one column of {', '.join(columns)}", ", ".join(found) or "none")
+    return found[0]
+
+
+def _at_least(path: Path, rows: Sequence[Row], least: int) -> None:
+    if len(rows) < least:
+        problem = f"needs {least} rows or more below the names of the columns"
+        raise InputError(str(path), problem, str(len(rows)))

@@ -1,0 +1,127 @@
+"""Text dumps of LIGGGHTS and LAMMPS (``dump custom``): the last complete frame.
+
+Columns and scaling follow the manuals of LAMMPS (``dump``) and LIGGGHTS: x or xu are lengths, xs and xsu
+parts of the box.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from experiments.grains.spheres.sphere_file import Columns, Format, SphereFile, spheres_of
+from experiments.io.errors import InputError
+
+PLACES = ("x", "xu", "xs", "xsu")
+"""Columns of a place, in order of preference."""
+BODIES = ("id_multisphere", "mol")
+"""Columns of a clump's number."""
+UNITS_OF = {"si": 1.0, "cgs": 1e-2, "micro": 1e-6, "nano": 1e-9}
+"""Size of a unit of length [m] in LAMMPS's systems of units."""
+
+
+@dataclass
+class _Frame:
+    line: int
+    items: dict[str, list[str]] = field(default_factory=dict)
+    """Lines of each item, by its name."""
+    columns: list[str] = field(default_factory=list)
+    first_row: int = 0
+
+    @property
+    def step(self) -> str:
+        return next(iter(self.items.get("TIMESTEP", [])), "?")
+
+    @property
+    def is_whole(self) -> bool:
+        [count] = self.items.get("NUMBER OF ATOMS", ["-1"])[:1] or ["-1"]
+        return count.isdigit() and len(self.items.get("ATOMS", [])) == int(count)
+
+
+def _frames(path: Path) -> Iterator[_Frame]:
+    """Yield the frames, with one in memory at a time."""
+    frame, rows = _Frame(1), []
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            if not line.startswith("ITEM:"):
+                rows.append(line.rstrip("\n"))
+                continue
+            words = line.split()[1:]
+            if words[:1] == ["TIMESTEP"] and frame.items:
+                yield frame
+                frame = _Frame(number)
+            rows = []
+            name, columns = _item(words)
+            frame.items[name] = rows
+            if name in ("ATOMS", "BOX BOUNDS"):
+                frame.items[f"{name} columns"] = columns
+            if name == "ATOMS":
+                frame.columns, frame.first_row = columns, number + 1
+    yield frame
+
+
+def _item(words: list[str]) -> tuple[str, list[str]]:
+    """Split an item into its name and the words after it."""
+    for name in ("ATOMS", "BOX BOUNDS", "NUMBER OF ATOMS"):
+        length = len(name.split())
+        if words[:length] == name.split():
+            return name, words[length:]
+    return " ".join(words), []
+
+
+def _read(path: Path) -> SphereFile:
+    count, chosen, last = 0, None, None
+    for frame in _frames(path):
+        count, last = count + 1, frame
+        if frame.is_whole and frame.columns:
+            chosen, position = frame, count
+    if chosen is None or last is None:
+        problem = "has no complete frame: ITEM: ATOMS needs as many lines as its NUMBER OF ATOMS"
+        raise InputError(str(path), problem)
+    place = f"{path}, line {chosen.first_row - 1}"
+    lengths, scaled = _columns(chosen.columns, place)
+    rows = ((chosen.first_row + n, row.split()) for n, row in enumerate(chosen.items["ATOMS"]))
+    spheres, bodies = spheres_of(rows, lengths, path)
+    if scaled:
+        low, high = _box(chosen, f"{path}, line {chosen.line}")
+        spheres[:, :3] = low + spheres[:, :3] * (high - low)
+    if bodies is not None and len(np.unique(bodies)) == 1 and bodies[0] == 0:
+        bodies = None
+    description = f"LIGGGHTS or LAMMPS dump, frame {position} of {count} (timestep {chosen.step})"
+    if chosen is not last:
+        description += ", the last complete one"
+    unit = UNITS_OF.get(next(iter(chosen.items.get("UNITS", [])), "").strip())
+    return SphereFile(description, spheres, bodies, unit)
+
+
+def _columns(names: list[str], place: str) -> tuple[Columns, bool]:
+    """Find the columns of the numbers; return them, and True if positions are parts of the box."""
+    start = next((name for name in PLACES if all(axis + name[1:] in names for axis in "xyz")), None)
+    size = next((name for name in ("radius", "diameter") if name in names), None)
+    if start is None or size is None:
+        problem = "needs the columns x y z (or xu, xs) and radius (or diameter)"
+        raise InputError(place, problem, " ".join(names) or "no columns")
+    x, y, z = (names.index(axis + start[1:]) for axis in "xyz")
+    body = next((names.index(name) for name in BODIES if name in names), None)
+    return Columns(x, y, z, names.index(size), size == "diameter", body), start in ("xs", "xsu")
+
+
+def _box(frame: _Frame, place: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of a frame's box."""
+    rows = [row.split() for row in frame.items.get("BOX BOUNDS", [])]
+    kinds = frame.items.get("BOX BOUNDS columns", [])
+    if "xy" in kinds or "abc" in kinds:
+        found = f"BOX BOUNDS {' '.join(kinds)}"
+        raise InputError(place, "positions in a tilted box are not supported", found, "Dump x y z.")
+    try:
+        low, high = np.array(rows, dtype=np.float64)[:3, :2].T
+    except ValueError:
+        problem = "BOX BOUNDS must have a lowest and a highest number for x, y and z"
+        raise InputError(place, problem, str(rows)) from None
+    return low, high
+
+
+DUMP = Format("dump of LIGGGHTS or LAMMPS", lambda head: head.startswith("ITEM:"), _read)

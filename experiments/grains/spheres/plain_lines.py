@@ -1,0 +1,58 @@
+"""Lines ``x y z r``: dem-warp's clumps, multisphere templates of LIGGGHTS, and others."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from experiments.grains.spheres.sphere_file import (
+    LARGEST,
+    SPHERE_RULE,
+    Columns,
+    Format,
+    SphereFile,
+    content_lines,
+    spheres_of,
+)
+from experiments.io.errors import InputError
+from experiments.io.texts import delimiter_of, is_number, read_text, split
+from experiments.io.units import UNITS
+
+_COLUMNS = re.compile(r"\bx,? y,? z,? r\b")
+_NAMED_UNIT = re.compile(rf"\bin ({'|'.join(UNITS['length'])})\b")
+"""Unit in a comment of dem-warp, after the names of the columns."""
+
+
+def _recognises(head: str) -> bool:
+    lines = content_lines(head)
+    if not lines:
+        return False
+    line = lines[0][1]
+    delimiter = delimiter_of(line)
+    cells = split(line, delimiter)
+    return len(cells) > 2 and sum(is_number(cell, delimiter) for cell in cells) > 2
+
+
+def _read(path: Path) -> SphereFile:
+    text = read_text(path, LARGEST)
+    lines = content_lines(text)
+    delimiter = delimiter_of(lines[0][1])
+    rows = [(number, split(line, delimiter)) for number, line in lines]
+    for number, cells in rows:
+        if len(cells) != 4:
+            raise InputError(f"{path}, line {number}", SPHERE_RULE, " ".join(cells))
+    spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3), path, delimiter)
+    description = "spheres (x y z r, as in multisphere templates of LIGGGHTS)"
+    return SphereFile(description, spheres, unit=_named_unit(text))
+
+
+def _named_unit(text: str) -> float | None:
+    """Size of the unit in a comment [m], or None."""
+    for line in text.splitlines():
+        columns = _COLUMNS.search(line) if line.lstrip().startswith("#") else None
+        if columns and (named := _NAMED_UNIT.search(line, columns.end())):
+            return UNITS["length"][named[1]]
+    return None
+
+
+PLAIN = Format("lines x y z r", _recognises, _read)

@@ -1,0 +1,75 @@
+"""Limits of measured values, from the size and duration of the test.
+
+A wrong unit changes a value by a factor of ten or more, so wide limits find it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from dem_warp import Drum, LiftedCylinder
+from experiments.io.errors import InputError
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.observables import BY_NAME, OBSERVABLES, Observable
+
+PATIENCE = 10.0
+"""Longest time for a heap to come to rest after the lift [s]."""
+
+
+@dataclass(frozen=True)
+class ValueLimits:
+    """Limits of the values of a test."""
+
+    grain: float
+    """Radius of the smallest sphere of a grain [m]: no heap is lower."""
+    length: float
+    """Radius of the flattest heap of the grains in the tube, or the extent of another test [m]."""
+    time: float
+    """Time from the start of the lift until long after its end [s]; infinite for another test."""
+    radius: float | None = None
+    """Radius of a drum [m]."""
+
+    def limits(self, observable: Observable) -> tuple[float, float]:
+        """Return the smallest and largest possible value of an observable, in its unit (deg, m, s or 1)."""
+        by_unit = {"deg": (0.0, 90.0), "m": (self.grain, self.length), "s": (0.0, self.time)}
+        if observable.part_of:  # the height beyond a heap's foot is 0; a drum's axis is in its middle
+            return (0.0 if self.radius is None else -self.length), self.length
+        masses = {"kg": (0.0, math.inf), "kg/s": (0.0, math.inf)}
+        return observable.limits or (by_unit | masses).get(observable.unit, (-math.inf, math.inf))
+
+    def require_height(self, height: float, hint: str, source: str, place: str) -> None:
+        """Refuse the outline of a heap, from a ``source``, whose greatest height [m] is impossible.
+
+        Raises
+        ------
+        InputError
+            With a ``hint`` at the probable cause.
+        """
+        low, high = self.limits(BY_NAME["height"])
+        if not low <= height <= high:
+            problem = f"the outline must be {1e3 * low:.3g} to {1e3 * high:.3g} mm high in this test"
+            raise InputError(place, problem, f"{1e3 * height:.6g} mm{source}", hint)
+
+
+def limits_of_test(study: Study, scene: str = TARGET_SCENE) -> ValueLimits:
+    """Return the limits of a study's test, or of another of its scenes."""
+    case = study.case({}, 0, scene)
+    test = case.scene
+    if not isinstance(test, LiftedCylinder):
+        half_x, half_y, bottom = test.room(case.grains.grain_reach)
+        room = max(2.0 * half_x, 2.0 * half_y, test.brim - bottom)
+        radius = test.diameter / 2 if isinstance(test, Drum) else None
+        return ValueLimits(case.grains.smallest_sphere, room, math.inf, radius)
+    reach = 4.0 * test.diameter + 2.0 * test.height
+    return ValueLimits(case.grains.smallest_sphere, reach, PATIENCE + 10.0 * test.height / test.lift_speed)
+
+
+def inversions(heap: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Find pairs of observables of one heap of which the smaller one is larger."""
+    for small in OBSERVABLES:
+        large = small.never_above
+        if small.name in heap and large in heap and not heap[small.name] <= heap[large]:
+            yield small.name, large

@@ -1,0 +1,1 @@
+"""Outlines of heaps, and lines on their flanks."""

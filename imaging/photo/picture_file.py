@@ -1,0 +1,147 @@
+"""Reading and writing of picture files. In memory, pictures are OpenCV's blue-green-red bytes."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from contextlib import suppress
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from imaging.geometry import Picture
+from imaging.picture_error import PictureError
+
+MAXIMUM_PIXELS = 120_000_000
+"""Largest picture that is read: 360 MB in memory. A file of a few kilobytes may claim as much."""
+LARGEST_FILE = 500_000_000
+"""Size of the largest file that is read [bytes]."""
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+HEIC_ENDINGS = (".heic", ".heif")
+FILM_DIAGONAL = math.hypot(36.0, 24.0)
+"""Diagonal of the 35 mm film that cameras' focal lengths are converted to [mm]."""
+FOCAL_LENGTH_TAG, WIDTH_TAG, HEIGHT_TAG, CAMERA_TAGS = 0xA405, 0xA002, 0xA003, 0x8769
+"""EXIF tags: focal length on 35 mm film [mm], width and height of the picture as taken, their table."""
+BROKEN = (OSError, ValueError, TypeError, SyntaxError)
+"""Errors of Pillow on a file that it cannot read; an unidentified image is an OSError."""
+
+
+def read_picture(path: str | Path) -> Picture:
+    """Read a picture file as (rows, columns, 3) uint8 in blue-green-red, upright as its camera says (EXIF).
+
+    HEIC needs the optional package pillow-heif.
+
+    Raises
+    ------
+    PictureError
+        When there is no such file, it is not a picture, or it has more than `MAXIMUM_PIXELS`.
+    """
+    file = Path(path)
+    if not os.path.isfile(file):  # unlike Path.is_file, it accepts names that are too long
+        problem = "not a regular file" if os.path.exists(file) else "no such file"
+        if os.path.isdir(file):
+            problem = "is a folder: name the files in it, e.g. FOLDER/*.jpg"
+        raise PictureError(str(path), problem)
+    if file.suffix.lower() in HEIC_ENDINGS:
+        return _read_heic(file)
+    if (length := file.stat().st_size) > LARGEST_FILE:
+        raise PictureError(str(path), f"must have at most {LARGEST_FILE:,} bytes", f"{length:,}")
+    # a file without a size in its header is not decoded: it may have any
+    size, picture, content = _claimed_size(file), None, file.read_bytes()
+    if size is not None and _holds_its_chunks(content):
+        _check_size(size, str(path))
+        with suppress(cv2.error):
+            picture = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_COLOR)
+    if picture is None:
+        raise PictureError(str(path), f"not a picture that OpenCV can read ({length} bytes)")
+    return picture.astype(np.uint8, copy=False)
+
+
+def _read_heic(file: Path) -> Picture:
+    try:
+        import pillow_heif
+    except ImportError:
+        problem = "HEIC needs pillow-heif (pip install 'dem-warp[heic]'), or save the picture as JPEG"
+        raise PictureError(str(file), problem) from None
+    try:
+        image = pillow_heif.open_heif(file, convert_hdr_to_8bit=True)
+        _check_size(image.size, str(file))
+        colors = np.asarray(image)[:, :, :3]
+    except (ValueError, OSError, RuntimeError, SyntaxError) as error:
+        raise PictureError(str(file), f"not a HEIC picture: {error}") from None
+    return np.ascontiguousarray(colors[:, :, ::-1])
+
+
+def _check_size(size: tuple[int, int], place: str) -> None:
+    if size[0] * size[1] > MAXIMUM_PIXELS:
+        raise _too_large(place, f"{size[0]} x {size[1]}")
+
+
+def _too_large(place: str, size: str) -> PictureError:
+    problem = f"must have at most {MAXIMUM_PIXELS // 10**6} million pixels: save it smaller"
+    return PictureError(place, problem, size)
+
+
+def _claimed_size(file: Path) -> tuple[int, int] | None:
+    """Read columns and rows from a file's header, without decoding it; None without a known header."""
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(file) as image:
+                return image.size
+    except Image.DecompressionBombError:
+        raise _too_large(str(file), "several times as many") from None
+    except BROKEN:
+        return None
+
+
+def _holds_its_chunks(content: bytes) -> bool:
+    """Return False for a PNG with a chunk longer than the file: OpenCV allocates what a chunk claims."""
+    if not content.startswith(PNG_SIGNATURE):
+        return True
+    at = len(PNG_SIGNATURE)
+    while at + 8 <= len(content):
+        length, kind = int.from_bytes(content[at : at + 4]), content[at + 4 : at + 8]
+        at += 12 + length  # length, kind, content, checksum
+        if kind == b"IEND":
+            break
+    return at <= len(content)
+
+
+def focal_length(path: str | Path) -> float | None:
+    """Read the focal length [pixels] of a picture's camera (EXIF); None if it is missing or the picture cut.
+
+    An uncut picture has the size that its camera wrote next to the focal length.
+    """
+    from PIL import Image
+
+    if not os.path.isfile(path):  # opening a pipe would wait for its writer
+        return None
+    try:
+        with warnings.catch_warnings(action="ignore"), Image.open(path) as image:
+            tags = image.getexif().get_ifd(CAMERA_TAGS)
+            size = sorted(image.size)
+        film = float(tags.get(FOCAL_LENGTH_TAG, 0))
+        taken = sorted(int(tags.get(tag, 0)) for tag in (WIDTH_TAG, HEIGHT_TAG))
+    except (*BROKEN, Image.DecompressionBombError):
+        return None
+    if not (5.0 <= film <= 2000.0) or taken != size:
+        return None
+    return film / FILM_DIAGONAL * math.hypot(*size)
+
+
+def save_picture(path: str | Path, image: Picture) -> Path:
+    """Write a picture in the format of the name's ending (.png, .jpg, ...), and return the path."""
+    file = Path(path)
+    try:
+        written, data = cv2.imencode(file.suffix, image)
+    except cv2.error:
+        written = False
+    if not written:
+        raise PictureError(str(path), "must end in a picture format (.png, .jpg, ...)", repr(file.suffix))
+    file.write_bytes(data.tobytes())
+    return file

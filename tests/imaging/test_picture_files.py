@@ -1,0 +1,79 @@
+"""Picture files: sizes that are refused before decoding, HEIC, focal lengths."""
+
+import struct
+import sys
+import types
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn_heaps import Camera, DrawnHeap, draw
+from PIL import Image
+
+from imaging import PictureError, measure_photograph, read_picture, save_picture
+from imaging.photo.picture_file import FILM_DIAGONAL, MAXIMUM_PIXELS, focal_length
+
+
+def png_of(path: Path, columns: int, rows: int) -> Path:
+    """Write a PNG of a few bytes whose header claims a size."""
+    chunks = b"\x89PNG\r\n\x1a\n"
+    for kind, data in (
+        (b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 2, 0, 0, 0)),
+        (b"IDAT", zlib.compress(b"\0" * 1000)),
+        (b"IEND", b""),
+    ):
+        chunks += struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    path.write_bytes(chunks)
+    return path
+
+
+@pytest.mark.parametrize("size", [(12_001, 10_000), (100_000, 100_000)])
+def test_a_picture_that_claims_too_many_pixels_is_not_decoded(tmp_path: Path, size: tuple[int, int]) -> None:
+    assert size[0] * size[1] > MAXIMUM_PIXELS
+    with pytest.raises(PictureError, match="at most 120 million pixels"):
+        read_picture(png_of(tmp_path / "bomb.png", *size))
+
+
+def test_heic_without_its_package_says_how_to_convert(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "pillow_heif", None)
+    (tmp_path / "phone.HEIC").write_bytes(b"ftypheic")
+    with pytest.raises(PictureError, match=r"dem-warp\[heic\].*save the picture as JPEG"):
+        read_picture(tmp_path / "phone.HEIC")
+
+
+def test_heic_is_read_as_blue_green_red(tmp_path: Path, monkeypatch) -> None:
+    class Decoded:
+        size = (40, 20)
+
+        def __array__(self, dtype=None, copy=None) -> np.ndarray:
+            return np.broadcast_to(np.array([200, 100, 50], np.uint8), (20, 40, 3)).copy()
+
+    package = types.SimpleNamespace(open_heif=lambda file, convert_hdr_to_8bit: Decoded())
+    monkeypatch.setitem(sys.modules, "pillow_heif", package)
+    (tmp_path / "phone.heic").write_bytes(b"ftypheic")
+    picture = read_picture(tmp_path / "phone.heic")
+    assert (picture.shape, picture[0, 0].tolist()) == ((20, 40, 3), [50, 100, 200])
+
+
+def with_focal_length(path: Path, picture: np.ndarray, film: int, taken: tuple[int, int]) -> Path:
+    """Store a picture with the tags of a phone."""
+    image = Image.fromarray(picture[:, :, ::-1])
+    exif = image.getexif()
+    exif.get_ifd(0x8769).update({0xA405: film, 0xA002: taken[0], 0xA003: taken[1]})
+    image.save(path, exif=exif, quality=95)
+    return path
+
+
+def test_a_near_camera_is_corrected_by_its_focal_length(tmp_path: Path) -> None:
+    picture = draw(DrawnHeap(30, 30), Camera(plate=(90, 90, 90), margin=0.8))
+    size = picture.shape[1::-1]
+    path = with_focal_length(tmp_path / "phone.jpg", picture, 26, size)
+    assert focal_length(path) == pytest.approx(26.0 / FILM_DIAGONAL * np.hypot(*size), rel=1e-6)
+    near = measure_photograph(path)
+    # The heap is 400 of 1040 pixels wide: the camera was 1 or 2 heap widths away and saw it flatter.
+    assert 1.0 < near.outline.distance < 2.0
+    assert near.mean > measure_photograph(save_picture(tmp_path / "plain.png", picture)).mean + 0.5
+    # Cut to another size than the camera's, a picture no longer has its angle of view.
+    assert focal_length(with_focal_length(tmp_path / "cut.jpg", picture, 26, (4000, 3000))) is None
+    assert focal_length(save_picture(tmp_path / "none.png", picture)) is None
