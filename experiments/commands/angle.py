@@ -66,7 +66,7 @@ def angle(
     as_csv: Annotated[bool, typer.Option("--csv", help="Print the rows as CSV.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Measure repose angles on photographs, and on simulated heaps of other codes.
+    r"""Measure repose angles on photographs, and on simulated heaps of other codes.
 
     How to take photographs:
 
@@ -79,7 +79,7 @@ def angle(
     - show nothing else: no tube, ruler, label or second heap (--crop cuts them off).
 
     Doubtful angles are marked, with the reason, and left out of the mean. Pictures in HEIC need
-    pip install 'dem-warp\\[heic]', or must be saved as JPEG. Heaps of spheres are viewed from eight sides.
+    pip install 'dem-warp\[heic]', or must be saved as JPEG. Heaps of spheres are viewed from eight sides.
     """
     with clear_errors():
         from experiments.measurement import photographs

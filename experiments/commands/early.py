@@ -36,7 +36,7 @@ def check_calibration_file(path: Path | None, scale: str | None = None, engine: 
     """
     if (study := _readable(path, scale, engine)) is None:
         return
-    from experiments.measurement.target import find_pictured, with_measurements
+    from experiments.measurement.measured_target import find_pictured, with_measurements
     from experiments.studyfile.campaign import TARGET_SCENE, scenes_of
 
     pictured = find_pictured(study)

@@ -1,1 +1,1 @@
-"""Grains: sizes, clumps and files of spheres."""
+"""Grains: sizes, clumps and files of spheres. Invalid input raises `InputError`."""

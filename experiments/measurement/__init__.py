@@ -1,1 +1,1 @@
-"""Measured heaps as files: read, checked, looked over, and a file to start from."""
+"""Measured heaps: files, pictures and profiles to values. Invalid input raises `InputError`."""

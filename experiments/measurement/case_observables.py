@@ -26,13 +26,7 @@ class Observed:
 
 
 def measure_heap(settings: MeasurementSection, result: CaseResult) -> HeapAngle:
-    """Measure the repose angle of a finished case with a study's settings.
-
-    Raises
-    ------
-    imaging.PictureError
-        When there is no measurable heap.
-    """
+    """Measure the repose angle of a finished case; raise `imaging.PictureError` without a heap."""
     return heap_angle(
         result.sphere_centers,
         result.sphere_radii,
@@ -66,14 +60,10 @@ def observe(settings: MeasurementSection, result: CaseResult, leaves_a_heap: boo
 def measure(
     settings: MeasurementSection, result: CaseResult, names: Sequence[str] = NAMES
 ) -> tuple[np.ndarray, str]:
-    """Measure named observables of a case, by default those of a heap; one failure fails all of them.
+    """Measure named observables of a case, by default those of a heap.
 
-    Returns
-    -------
-    values : (observables,) array
-        Values in their units, or NaN.
-    reason : str
-        Reason of a failure: the case failed, its heap cannot be measured, or a value is missing.
+    Return the values (observables,) in their units and an empty reason; or all NaN with the reason of a
+    failure: the case failed, its heap cannot be measured, or a value is missing.
     """
     leaves_a_heap = any(name in BY_NAME and BY_NAME[name].by_photograph for name in names)
     found = observe(settings, result, leaves_a_heap)

@@ -27,13 +27,7 @@ class Duplicates:
         self.add(self._digests[path], heap, name, place)
 
     def add(self, content: Hashable, heap: Hashable, name: str, place: str) -> None:
-        """Add the content of a heap.
-
-        Raises
-        ------
-        InputError
-            When another heap has the same content; it names both places.
-        """
+        """Add the content of a heap."""
         first, where = self._given.setdefault(content, (heap, f"{name} ({place})"))
         if first != heap:
             raise InputError(place, f"{name} is a copy of {where}", hint="Each repeat needs its own heap.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from experiments.grains.spheres import format_of, length_unit, read_spheres
+from experiments.grains.spheres.clump_file import unit_option
 from experiments.io.errors import InputError
-from experiments.io.units import Quantity
+from experiments.io.units import read_quantity
 from experiments.studyfile.study import MeasurementSection
-from imaging import Doubt, HeapAngle, heap_angle, overlay, snapshot
+from imaging import Doubt, HeapAngle, ReposeAngle, heap_angle, overlay, snapshot
 from imaging.drawing.ground import find_ground
 from imaging.geometry import Picture, Spheres
 from imaging.photo.doubts import GREATEST_ANGLE, LEAST_ANGLE, ROUGH_EDGE
 
+SIDES = ("left", "right")
 DEFAULT_UNIT = "m"
 """Unit of a heap's file without a unit; angles do not depend on it."""
 BELOW = 0.5
@@ -54,14 +56,8 @@ class MeasuredHeap:
 
 def heap_settings(unit: str | None, plate_height: str | None) -> HeapSettings:
     """Read the options of files of heaps; raise `InputError` for an invalid unit or height."""
-    try:
-        size = None if unit is None else length_unit(unit)
-    except ValueError as error:
-        raise InputError("--unit", str(error), unit) from None
-    try:
-        height = None if plate_height is None else Quantity.parse(plate_height).to_base("length")
-    except ValueError as error:
-        raise InputError("--plate-height", str(error), plate_height) from None
+    size = None if unit is None else unit_option(unit)
+    height = None if plate_height is None else read_quantity(plate_height, "length", "--plate-height")
     return HeapSettings(size, height)
 
 
@@ -113,18 +109,18 @@ def _span(radii: np.ndarray) -> str:
 
 def values_of(heap: MeasuredHeap, level: float) -> dict[str, Any]:
     """Return the values of a heap's row, without those of a camera; flanks are means over its views."""
-    low, high = heap.angle.interval(level)
-    views = heap.angle.views
-    return {
-        "left": float(np.mean([view.left for view in views])),
-        "right": float(np.mean([view.right for view in views])),
-        "mean": heap.angle.mean,
-        "se": heap.angle.se,
-        "low": low,
-        "high": high,
-        "source": heap.source,
-        "doubts": [str(doubt) for doubt in _doubts(heap.angle)],
-    }
+    left, right = (float(np.mean([getattr(view, side) for view in heap.angle.views])) for side in SIDES)
+    values = mean_values(heap.angle, left, right, level, _doubts(heap.angle))
+    return values | {"source": heap.source}
+
+
+def mean_values(
+    angle: HeapAngle | ReposeAngle, left: float, right: float, level: float, doubts: Iterable[Doubt]
+) -> dict[str, Any]:
+    """Return the values of any row."""
+    low, high = angle.interval(level)
+    values = {"left": left, "right": right, "mean": angle.mean, "se": angle.se, "low": low, "high": high}
+    return values | {"doubts": [str(doubt) for doubt in doubts]}
 
 
 def _doubts(angle: HeapAngle) -> Iterator[Doubt]:

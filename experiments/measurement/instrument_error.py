@@ -75,35 +75,19 @@ def _with_one_scale(observable: Observable) -> str:
 def stated_calibration(
     rows: Sequence[Row], known: Mapping[str, Observable], measured: Sequence[str]
 ) -> dict[str, Calibration]:
-    """Return the instrument errors of measured observables: stated by rows, or else the usual ones.
+    """Return the instrument errors of ``measured`` observables: stated by rows, or else the usual ones.
 
-    Parameters
-    ----------
-    rows : sequence of Row
-        Rows with the condition `CALIBRATION`.
-    known : mapping
-        Observables of the test by name and by alias.
-    measured : sequence of str
-        Names of the measured observables.
-
-    Raises
-    ------
-    InputError
-        When a row is invalid.
+    ``known`` has the observables of the test by name and by alias.
     """
     found = {name: usual_error(known[name]) for name in measured}
     if any(_kind(row) == NONE for row in rows):
         found = {name: Calibration(instrument=_with_one_scale(known[name])) for name in measured}
     for row in rows:
-        if (kind := _kind(row)) != NONE:
-            observable = _observable(row, known)
-            if observable.name in found:
-                known_so_far = found[observable.name]
-                if kind == "offset":
-                    stated = replace(known_so_far, offset=_value(row, observable.unit))
-                else:
-                    stated = replace(known_so_far, scale=_value(row, "1"))
-                found[observable.name] = stated
+        if (kind := _kind(row)) != NONE and (observable := _observable(row, known)).name in found:
+            value = _value(row, observable.unit if kind == "offset" else "1")
+            known_so_far = found[observable.name]
+            stated = {"offset": known_so_far.offset, "scale": known_so_far.scale, kind: value}
+            found[observable.name] = replace(known_so_far, offset=stated["offset"], scale=stated["scale"])
     return found
 
 

@@ -42,13 +42,7 @@ NEEDED = COLUMNS[:3]
 
 
 def read_measured(path: Path, study: Study) -> Measured:
-    """Read heaps measured under the conditions of a study, with its measurement settings.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, has no valid value, or is invalid; with all problems and their rows.
-    """
+    """Read heaps measured under the conditions of a study, with its measurement settings."""
     sizes = {condition.name: limits_of_test(study.under(condition.name)) for condition in study.conditions}
     observables = study.measurable
     found = _Found({name: each for each in observables for name in (each.name, each.column)})

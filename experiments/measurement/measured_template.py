@@ -53,13 +53,7 @@ study's, which is the default."""
 
 
 def write_measured_template(study: Study, folder: Path | None = None) -> Path:
-    """Write a commented file for the measured heaps of ``NAME.toml``, ``NAME-measured.csv``.
-
-    Raises
-    ------
-    InputError
-        When the file exists.
-    """
+    """Write a commented file for the measured heaps of ``NAME.toml``, ``NAME-measured.csv``."""
     path = (folder or Path()) / f"{study.file.stem}-measured.csv"
     require_new_file(path, "a new file")
     head = _HEAD.format(

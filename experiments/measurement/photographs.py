@@ -20,7 +20,13 @@ from doe import Sample
 from experiments.io.errors import InputError
 from experiments.io.files import replacing
 from experiments.measurement.duplicates import Duplicates
-from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file, values_of
+from experiments.measurement.heap_files import (
+    HeapSettings,
+    is_heap_file,
+    mean_values,
+    measure_heap_file,
+    values_of,
+)
 from experiments.studyfile.target_section import Grouping
 from imaging import (
     FitSettings,
@@ -70,13 +76,7 @@ class PictureOptions:
 
 
 def find_pictures(pattern: str, folder: Path, place: str, by: Grouping = "picture") -> list[Path]:
-    """Find the pictures of a folder, or of a pattern like ``photos/*.jpg``, relative to ``folder``.
-
-    Raises
-    ------
-    InputError
-        When there are fewer than two.
-    """
+    """Find the pictures of a folder, or of a pattern like ``photos/*.jpg``, relative to ``folder``."""
     named = folder / pattern
     if os.path.isdir(named):  # unlike Path.is_dir, it accepts names that are too long
         inner = named.rglob("*") if by == "folder" else named.iterdir()
@@ -100,17 +100,10 @@ def require_separate(pictures: Sequence[Path], options: PictureOptions, place: s
 def measure_pictures(
     pictures: Sequence[Path], options: PictureOptions | None = None, overlay_folder: Path | None = None
 ) -> list[Row]:
-    """Measure the repose angle of each picture; a failed one does not affect the others.
+    """Measure the repose angle of each picture, or file of spheres; a failed one does not affect the others.
 
-    Parameters
-    ----------
-    pictures
-        Picture files, and files of spheres with a heap of LIGGGHTS, LAMMPS, Yade or another code.
-    options
-        Options of the measurement.
-    overlay_folder
-        Folder for copies with the fitted flanks: ``NAME-angle.png`` for each picture, with its folder's name
-        where two have one name; for a file of spheres also ``NAME-angle-clean.png``, without the flanks.
+    The overlay folder gets copies with the fitted flanks: ``NAME-angle.png`` for each picture, with its
+    folder's name where two have one name; for spheres also ``NAME-angle-clean.png``, without flanks.
 
     Returns
     -------
@@ -121,13 +114,6 @@ def measure_pictures(
         where it is known, the ``plate``'s line (x1, y1, x2, y2) and the heap's width ``heap_pixels``
         [pixels], all None for a failed one; ``doubts``, a list of sentences; ``overlay``, the drawn copy or
         None; ``reason`` of a failure, else empty.
-
-    Raises
-    ------
-    InputError
-        When the folder for the drawn copies is a file.
-    imaging.PictureError
-        When there is no such fit.
     """
     options = options or PictureOptions()
     FitSettings.of(options.fit)
@@ -176,22 +162,14 @@ def _drawn_photograph(picture: Path, angle: ReposeAngle) -> tuple[Picture]:
 
 
 def _values(angle: ReposeAngle) -> Row:
-    low, high = angle.interval(LEVEL)
     outline = angle.outline
     columns, rows = outline.plate.picture_point(outline.position[[0, -1]], np.zeros(2))
-    return {
-        "left": angle.left,
-        "right": angle.right,
-        "mean": angle.mean,
-        "se": angle.se,
-        "low": low,
-        "high": high,
+    return mean_values(angle, angle.left, angle.right, LEVEL, angle.doubts) | {
         "tilt": outline.plate.tilt,
         "elevation": outline.elevation,
         "distance": outline.distance,
         "plate": [float(value) for value in (columns[0], rows[0], columns[1], rows[1])],
         "heap_pixels": float(np.ptp(outline.position)),
-        "doubts": [str(doubt) for doubt in angle.doubts],
     }
 
 
@@ -248,18 +226,22 @@ class MeanAngle:
         return asdict(self)
 
 
+def used_rows(rows: Sequence[Mapping[str, Any]], options: PictureOptions) -> list[Mapping[str, Any]]:
+    """Return the rows that count in the mean."""
+    return [row for row in rows if row["mean"] is not None and (options.keep_doubtful or not row["doubts"])]
+
+
 def mean_angle(rows: Sequence[Mapping[str, Any]], options: PictureOptions | None = None) -> MeanAngle | None:
     """Average the rows of `measure_pictures` over heaps; None where no picture counts."""
     options = options or PictureOptions()
-    measured = [row for row in rows if row["mean"] is not None]
-    used = [row for row in measured if options.keep_doubtful or not row["doubts"]]
+    used = used_rows(rows, options)
     if not used:
         return None
     heaps: dict[Hashable, list[float]] = {}
     for number, row in enumerate(used):
         heaps.setdefault(options.heap_of(Path(row["picture"]), number), []).append(row["mean"])
     means = np.array([np.mean(views) for views in heaps.values()])
-    left_out = tuple(row["picture"] for row in measured if row not in used)
+    left_out = tuple(row["picture"] for row in rows if row["mean"] is not None and row not in used)
     mean, n = float(means.mean()), len(means)
     if n == 1:
         return MeanAngle(mean, None, n, None, None, len(used), left_out)
@@ -269,13 +251,7 @@ def mean_angle(rows: Sequence[Mapping[str, Any]], options: PictureOptions | None
 
 
 def target_sample(rows: Sequence[Mapping[str, Any]], options: PictureOptions, place: str) -> Sample:
-    """Return the sample of heaps that a target is made of.
-
-    Raises
-    ------
-    InputError
-        When there are fewer than two heaps; it has the reason of every picture that does not count.
-    """
+    """Return the sample of heaps that a target is made of."""
     mean = mean_angle(rows, options)
     if mean is None or mean.sd is None:
         problem = "; ".join(("needs two measured heaps at least", *left_out_notes(rows, options)))

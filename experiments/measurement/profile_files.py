@@ -61,14 +61,7 @@ class _Points(NamedTuple):
 
 
 def read_drum_profiles(path: Path, radius: float) -> Profiles:
-    """Read profiles of a drum of a radius [m] as heights above its axis, at its stations.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, a point is outside the drum, the profiles span too few stations, or one
-        of them has a gap, is mirrored or is a copy of another.
-    """
+    """Read profiles of a drum of a radius [m] as heights above its axis, at its stations."""
     found: dict[str, dict[str, _Points]] = {}
     for row in read_rows(path, ("replicate", "x", "z"), COLUMNS[:4]):
         x, z = _take_point(row, found)
@@ -95,20 +88,7 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
 def read_heap_profiles(path: Path, fit: str, size: ValueLimits) -> Profiles:
     """Read outlines of heaps at the stations of `imaging.heap_profile`, from points, pictures and spheres.
 
-    Parameters
-    ----------
-    path
-        The file.
-    fit
-        Fit of the flanks in pictures and files of spheres.
-    size
-        Limits of the heap's height.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, a picture has no heap or a doubtful one, a profile lacks a foot or is a
-        copy of another, or its height is impossible.
+    ``fit`` is that of the flanks in pictures and spheres, ``size`` has the limits of the heap's height.
     """
     points: dict[str, dict[str, _Points]] = {}
     heaps: dict[str, list[np.ndarray]] = {}
@@ -228,9 +208,7 @@ def _pictured(row: Row, fit: str, size: ValueLimits) -> Iterator[np.ndarray]:
             return
         if not row["pixel"]:
             raise row.error("outlines in a picture need the size of its pixels, e.g. 0.1 mm", "pixel")
-        pixel = _length(row, "pixel")
-        if pixel <= 0.0:
-            raise row.error("must be positive", "pixel")
+        pixel = read_pixel(row)
         seen = measure(find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path)), fit)
     except PictureError as error:
         raise InputError(place, f"has no measurable heap: {error}") from None
@@ -241,6 +219,14 @@ def _pictured(row: Row, fit: str, size: ValueLimits) -> Iterator[np.ndarray]:
     height = heap_shape(seen.outline).height
     size.require_height(height, "Check the size of the pixels.", source, row.place("pixel"))
     yield heap_profile(seen.outline)
+
+
+def read_pixel(row: Row) -> float:
+    """Read the size of a row's pixels [m]."""
+    pixel = _length(row, "pixel")
+    if pixel <= 0.0:
+        raise row.error("must be positive", "pixel")
+    return pixel
 
 
 def _length(row: Row, column: str) -> float:

@@ -14,7 +14,7 @@ from experiments.io.errors import InputError, Problem
 from experiments.io.rows import Row
 from experiments.io.texts import nearest_name
 from experiments.io.units import Quantity
-from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
+from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles, read_pixel
 from experiments.measurement.value_limits import ValueLimits
 from experiments.studyfile.observables import (
     DIMENSIONS,
@@ -182,7 +182,7 @@ def _seen(
         raise row.error("this test leaves no heap to photograph: write the values", "picture")
     if not os.path.isfile(path):  # unlike Path.is_file, it accepts names that are too long
         raise row.error(f"no such file: {path}", "picture")
-    pixel = _pixel(row)
+    pixel = read_pixel(row) if row["pixel"] else None
     if name and pixel is None and known[name].unit == "m":
         raise row.error(PIXEL_RULE, "pixel")
     # a file of numbers needs no pictures
@@ -197,18 +197,6 @@ def _seen(
         if wanted and observable.by_photograph:
             value = observable.in_pictures(views)
             yield Reading(row, observable.name, value, row["picture"], _doubt(row, observable, value, size))
-
-
-def _pixel(row: Row) -> float | None:
-    if not row["pixel"]:
-        return None
-    try:
-        pixel = Quantity.parse(row["pixel"]).to_base("length")
-    except ValueError as error:
-        raise row.error(str(error), "pixel") from None
-    if pixel <= 0.0:
-        raise row.error("must be positive", "pixel")
-    return pixel
 
 
 def _doubt(row: Row, observable: Observable, value: float, size: ValueLimits) -> Problem | None:

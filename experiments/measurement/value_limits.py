@@ -41,13 +41,7 @@ class ValueLimits:
         return observable.limits or (by_unit | masses).get(observable.unit, (-math.inf, math.inf))
 
     def require_height(self, height: float, hint: str, source: str, place: str) -> None:
-        """Refuse the outline of a heap, from a ``source``, whose greatest height [m] is impossible.
-
-        Raises
-        ------
-        InputError
-            With a ``hint`` at the probable cause.
-        """
+        """Refuse the outline of a heap, from a ``source``, whose greatest height [m] is impossible."""
         low, high = self.limits(BY_NAME["height"])
         if not low <= height <= high:
             problem = f"the outline must be {1e3 * low:.3g} to {1e3 * high:.3g} mm high in this test"

@@ -28,7 +28,7 @@ from experiments.io.errors import StudyError
 from experiments.io.files import write_text
 from experiments.io.plain_data import jsonable
 from experiments.journal.journal import Journal
-from experiments.measurement.target import with_measurements
+from experiments.measurement.measured_target import with_measurements
 from experiments.report import heap_pictures, verified_heap, write_report
 from experiments.report.kit.markdown import WALL_TIMES
 from experiments.report.study_companion import Replay, companion_of

@@ -45,16 +45,7 @@ class Scenery:
     def draw(
         self, centers: ArrayLike, radii: ArrayLike, grains: ArrayLike, walls: Sequence[FloatArray], text: str
     ) -> Picture:
-        """Draw spheres, with thin walls over them and a line of text (ASCII) above.
-
-        Parameters
-        ----------
-        centers, radii, grains
-            Spheres, as for `snapshot`; there may be no spheres.
-        walls : sequence of (n, 3, 3) array
-            Triangles of each wall [m].
-        text : str
-        """
+        """Draw spheres as `snapshot` does, thin walls of triangles (n, 3, 3) [m], and a line of ASCII."""
         frame = self.frame
         points, sizes = np.asarray(centers, dtype=float), np.asarray(radii, dtype=float)
         image = empty_plate(frame)
@@ -88,13 +79,7 @@ def _glaze(image: Picture, triangles: FloatArray) -> None:
 
 
 def save_film(path: str | Path, pictures: Sequence[Picture], each: float) -> None:
-    """Write pictures of one size as a film, .gif or .mp4, that shows each picture for a time [s].
-
-    Raises
-    ------
-    PictureError
-        When there is no picture, the ending is unknown, or the film cannot be written.
-    """
+    """Write pictures of one size as a film, .gif or .mp4, that shows each picture for a time [s]."""
     kind = Path(path).suffix.lower()
     if kind not in KINDS:
         raise PictureError(str(path), f"must end in {' or '.join(KINDS)}", kind or "no ending")

@@ -18,11 +18,6 @@ def find_ground(spheres: Spheres) -> float:
     """Find the height of the plate on which most spheres rest, in the unit of the spheres.
 
     Spheres that fell off the plate, and those on other spheres, do not count.
-
-    Raises
-    ------
-    PictureError
-        When fewer than `LEAST_RESTING` spheres rest at any height.
     """
     lowest = np.sort(spheres.centers[:, 2] - spheres.radii)
     layer = REST * float(np.median(spheres.radii))

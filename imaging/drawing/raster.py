@@ -29,15 +29,8 @@ def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
     """Draw the share of each pixel that the spheres cover, 0 to 255, with a horizontal orthographic camera.
 
     Every sphere covers one run of fine rows in each fine column; the runs are opened and closed in a
-    difference image whose running sum along the columns is the number of spheres over a pixel.
-
-    Parameters
-    ----------
-    spheres : Spheres
-        Within the frame, centred on its axis (`Frame.select`).
-    frame : Frame
-    azimuth : float
-        Direction of the camera [rad].
+    difference image whose running sum along the columns is the number of spheres over a pixel. The spheres
+    are within the frame, centred on its axis (`Frame.select`).
     """
     right, up, radii = _pixel_positions(spheres, frame, azimuth, SUPERSAMPLING)
     rows, columns = (SUPERSAMPLING * size for size in frame.shape)

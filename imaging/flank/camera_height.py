@@ -33,16 +33,8 @@ def seen_angle(angle: float, elevation: float, distance: float) -> float:
     The outline is the pair of tangents from the tip to the ellipse that is the image of the base's circle.
     From far away, with the height h and the base's radius r, they go from h cos e to half axes r and r sin e:
     tan(seen)^2 = tan(angle)^2 cos(e)^2 - sin(e)^2. From nearby the effect is smaller: the tip is closer to a
-    camera that looks down than the foot behind it.
-
-    Parameters
-    ----------
-    angle : float
-        Angle of the cone [degrees].
-    elevation : float
-        Angle at which the camera looks down on the plate [degrees].
-    distance : float
-        Distance from the camera to the cone's axis, in widths of its base; may be infinite.
+    camera that looks down than the foot behind it. `angle` and `elevation`, at which the camera looks down,
+    are in degrees; `distance` is that of the cone's axis, in widths of its base, and may be infinite.
     """
     turn, slope = np.radians(elevation), np.tan(np.radians(angle))
     around = np.linspace(-0.5 * np.pi, 0.5 * np.pi, BASE_POINTS)

@@ -83,21 +83,8 @@ def find_plate(top: FloatArray, bottom: FloatArray, place: str, shelf: bool = Tr
 
     Where the plate is visible next to the heap, the outermost parts of the upper edge are on one line, the
     plate. Otherwise the line is the lower edge of the heap, under its thicker columns: those of its toes are
-    faint, or end on the round undersides of single grains.
-
-    Parameters
-    ----------
-    top, bottom : (n,) arrays
-        Rows of the two edges in consecutive columns; NaN outside the body.
-    place : str
-        Names the picture in errors.
-    shelf : bool
-        Look for a plate that is visible next to the heap.
-
-    Raises
-    ------
-    PictureError
-        When the foreground is too narrow, or the line too steep for a plate.
+    faint, or end on the round undersides of single grains. Edges are NaN outside the body; without `shelf` no
+    plate next to the heap is looked for.
     """
     columns = np.flatnonzero(np.isfinite(top))
     if len(columns) < MINIMUM_BODY_WIDTH:

@@ -56,20 +56,7 @@ def contrast_with_background(
     The background is a quadratic surface in each colour channel, fitted from the border inwards. So uneven
     light and a coloured cloth do not matter, and a heap may be darker or lighter than the background. The
     first threshold is Otsu's (IEEE Trans. SMC 9, 1979). It may separate a plate of high contrast from the
-    heap, so the second one splits what is below the first.
-
-    Parameters
-    ----------
-    picture : (rows, columns) or (rows, columns, 3) uint8 array
-    place : str
-        Names the picture in errors.
-    precision : type
-        Floating point type of the background surface.
-
-    Raises
-    ------
-    PictureError
-        When the array is no picture, or nothing differs from its background.
+    heap, so the second one splits what is below the first. The surface has the given precision.
     """
     channels = _channels(picture, place)
     blurred = cv2.GaussianBlur(channels, (0, 0), sigmaX=BLUR, sigmaY=1e-6)

@@ -62,17 +62,7 @@ def doubts_of(
     outline: Outline,
     largest_error: float = LARGEST_ERROR,
 ) -> Iterator[Doubt]:
-    """Apply the rules to an angle with its fitted lines; the doubts of the outline itself are not repeated.
-
-    Parameters
-    ----------
-    left, right : FlankLine
-    mean, se : float
-        Angle with its standard error [degrees].
-    outline : Outline
-    largest_error : float
-        Largest standard error without a doubt [degrees].
-    """
+    """Apply the rules to an angle with its standard error; the outline's own doubts are not repeated."""
     lean = abs(left.angle - right.angle)
     if lean > LARGEST_LEAN:
         yield Doubt("lean", f"left and right are {lean:.1f} degrees apart, over {LARGEST_LEAN:g}")

@@ -56,16 +56,8 @@ def below_plate(
     """Compare what is below the plate's line with the plate.
 
     The plate's own colour along each levelled row is interpolated between its two ends, which removes its
-    top, its front and the light on them; the heap remains, or its shadow.
-
-    Parameters
-    ----------
-    colors : (rows, columns, channels) array
-    heap : (rows, columns) bool array
-        The part of the heap above the plate's line.
-    body : (rows, columns) bool array
-        The whole foreground, with the plate.
-    plate : PlateLine
+    top, its front and the light on them; the heap remains, or its shadow. `heap` is the part of it above the
+    plate's line, `body` the whole foreground.
     """
     rows, columns = heap.shape
     nothing = np.zeros((rows, columns), dtype=np.float32)
@@ -116,14 +108,7 @@ def is_lowest_row(
 ) -> bool:
     """Return True if the supposed plate is the heap's lowest row of grains, whose tops are on a line too.
 
-    Such a row is as wide as the heap, a grain deep, of the heap's hues, and as uneven.
-
-    Parameters
-    ----------
-    colors, heap, body, plate
-        Arguments of `below_plate`.
-    least : float
-        Least difference of two colours [of 255].
+    Such a row is as wide as the heap, a grain deep, of its hues within `least` [of 255], and as uneven.
     """
     covered = np.flatnonzero(body.any(axis=0))
     width = float(np.ptp(covered))
@@ -197,14 +182,9 @@ class Base:
 
 
 def front_of_base(bottom: FloatArray, slope: float | None) -> Base:
-    """Fit the front of the base to the lower edge of a heap by least absolute deviations.
+    """Fit the front of the base to the lower edge of a heap (NaN outside) by least absolute deviations.
 
-    Parameters
-    ----------
-    bottom : (columns,) array
-        Rows of the lower edge; NaN outside the heap.
-    slope : float, optional
-        Slope of the plate; default: it is fitted.
+    The slope of the plate is fitted if it is unknown.
     """
     columns = np.flatnonzero(np.isfinite(bottom)).astype(np.float64)
     ends = (float(columns[0]) - 0.5, float(columns[-1]) + 0.5)

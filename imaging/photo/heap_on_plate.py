@@ -259,16 +259,8 @@ def refuse_narrow_base(seen: Contrast, found: FoundHeap, ends: tuple[float, floa
     """Refuse a heap on or in something no wider than itself: a dish, a box, a narrow board.
 
     What is directly below its foot then differs from both sides at the same level, apart from shadows; on a
-    plate it is the plate as well. Or it is round below.
-
-    Parameters
-    ----------
-    seen : Contrast
-    found : FoundHeap
-    ends : (float, float)
-        Where the flanks' lines meet the plate [pixels along it].
-    place : str
-        Names the picture in errors.
+    plate it is the plate as well. Or it is round below. `ends` are the positions where the flanks' lines meet
+    the plate.
     """
     least = _least_difference(seen)
     position, height = found.plate.level(*found.edge())

@@ -54,8 +54,7 @@ def test_stray_grains_do_not_count(heap) -> None:
     assert compare(with_strays, alone).value == pytest.approx(0.0, abs=0.1)
 
 
-def test_interval_is_students(heap) -> None:
-    angle = heap_angle(heap.centers, heap.radii)
+def test_interval_is_students(angle) -> None:
     low, high = angle.interval(0.9)
     assert high - angle.mean == pytest.approx(stats.t.ppf(0.95, angle.dof) * angle.se, rel=1e-12)
     assert angle.mean - low == pytest.approx(high - angle.mean, rel=1e-9)

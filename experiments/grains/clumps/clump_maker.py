@@ -15,7 +15,7 @@ from dem_warp.solids import parse_solid, read_mesh
 from experiments.grains.clumps.clump_picture import draw_clump
 from experiments.grains.clumps.clump_search import Trial, fit_by_volume, fit_within
 from experiments.grains.spheres import format_of, length_unit, read_clump
-from experiments.grains.spheres.clump_file import GRAIN_SIZES, check_grain_size
+from experiments.grains.spheres.clump_file import GRAIN_SIZES, check_grain_size, unit_option
 from experiments.io.errors import InputError
 from experiments.io.files import replacing, require_new_file
 
@@ -101,14 +101,7 @@ class Clump:
 
 
 def make_clump(request: ClumpRequest, watch: Callable[[Trial], None] = lambda trial: None) -> Clump:
-    """Read a clump from a file of spheres, or fit one to a solid.
-
-    Raises
-    ------
-    InputError
-        When the source is neither, the number of spheres is missing or not needed, or no clump is within the
-        tolerance.
-    """
+    """Read a clump from a file of spheres, or fit one to a solid."""
     source, unit = request.source, request.unit
     path, named = Path(source), ":" in source and not Path(source).is_file()
     if not named and not path.exists():
@@ -124,7 +117,7 @@ def make_clump(request: ClumpRequest, watch: Callable[[Trial], None] = lambda tr
     if named and unit is not None:
         raise InputError("--unit", "the dimensions of a solid are always in mm", unit)
     if unit is not None:
-        _check_unit(unit)
+        unit_option(unit)
     if given:
         read = read_clump(path, unit)
         return Clump(read.shape, description=read.description)
@@ -156,13 +149,6 @@ def _holds_spheres(path: Path, to_fit: bool) -> bool:
     if path.suffix.lower() in MESH_FILES:
         return False
     return not to_fit or (path.is_file() and format_of(path) is not None)
-
-
-def _check_unit(unit: str) -> None:
-    try:
-        length_unit(unit)
-    except ValueError as error:
-        raise InputError("--unit", str(error), unit) from None
 
 
 def _mesh(path: Path, unit: str | None) -> Trimesh:

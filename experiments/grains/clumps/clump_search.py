@@ -90,30 +90,10 @@ def fit_by_volume(solid: Trimesh, sphere_count: int) -> tuple[ClumpFit, float]:
 def fit_within(
     solid: Trimesh, tolerance: float, protrusion: float | None, watch: Callable[[Trial], None]
 ) -> tuple[ClumpFit, list[Trial]]:
-    """Fit more and more spheres until a clump is within a tolerance.
+    """Fit more and more spheres until a clump is within a tolerance (see `Trial`); return all trials, too.
 
-    Parameters
-    ----------
-    solid
-        Closed surface [m].
-    tolerance
-        Largest error, see `Trial`.
-    protrusion
-        Distance by which a sphere may pass the surface [m]; None: the one that keeps the volume.
-    watch
-        Called with each trial.
-
-    Returns
-    -------
-    fit
-        First clump within the tolerance.
-    trials
-        All trials.
-
-    Raises
-    ------
-    InputError
-        When the largest of `COUNTS` is not enough.
+    A sphere may pass the surface by the protrusion [m]; None: the one that keeps the volume. `watch` is
+    called with each trial.
     """
     trials: list[Trial] = []
     for count in COUNTS:

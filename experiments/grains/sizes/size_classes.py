@@ -53,21 +53,8 @@ def cut_classes(
     """Cut a distribution at two quantiles, and divide the rest into classes of equal shares.
 
     The number and the volume of the grains of each class are those of the distribution: its diameter is that
-    of the grain of mean mass.
-
-    Parameters
-    ----------
-    distribution
-        Distribution of the diameter.
-    basis
-        Quantity of the shares and quantiles.
-    cut
-        Quantiles, 0 to 1.
-    count
-        Number of classes.
-    unaccounted
-        Part of the whole that is not in the distribution: what passes the finest sieve, or stays on the
-        coarsest.
+    of the grain of mean mass. `basis` is the quantity of the shares and quantiles, `unaccounted` the part of
+    the whole that is not in the distribution: what passes the finest sieve, or stays on the coarsest.
 
     Raises
     ------

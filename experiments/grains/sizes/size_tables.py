@@ -27,19 +27,8 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
     """Read a sieve analysis with one sieve per row, the finest first.
 
     Columns: ``opening``, and one of ``retained`` (mass on the sieve), ``retained_percent`` and
-    ``passing_percent``. The opening of a pan is 0. ``unit`` is that of openings without one.
-
-    Returns
-    -------
-    distribution
-        Distribution by mass, between the finest and the coarsest opening.
-    unaccounted
-        Part of the mass beyond them: in the pan, and on the coarsest sieve.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read or is invalid, with the row.
+    ``passing_percent``. The opening of a pan is 0. ``unit`` is that of openings without one. Return the
+    distribution by mass between the finest and the coarsest opening, and the part of the mass beyond them.
     """
     _refuse_mesh_numbers(path)
     rows = list(read_rows(path, ("opening",), SIEVE_COLUMNS))
@@ -81,11 +70,6 @@ def read_counts(path: Path, unit: str | None = None) -> Tabulated:
 
     Columns: ``diameter``, with or without ``count``; or ``from``, ``to`` and ``count``. ``count`` may be any
     share: a number, a volume. ``unit`` is that of diameters without one.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read or is invalid, with the row.
     """
     rows = list(read_rows(path, (), COUNT_COLUMNS))
     _at_least(path, rows, 1)

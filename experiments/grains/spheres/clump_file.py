@@ -35,13 +35,7 @@ class ClumpFile:
 
 
 def length_unit(text: str) -> float:
-    """Return the size of a unit of length [m]: a name (``mm``), or the length of 1 in a file (``2.5 mm``).
-
-    Raises
-    ------
-    ValueError
-        When the text is neither.
-    """
+    """Return the size of a unit [m], a name (``mm``) or the length of 1 (``2.5 mm``); raise `ValueError`."""
     name = text.strip()
     if name in UNITS["length"]:
         return UNITS["length"][name]
@@ -55,22 +49,16 @@ def length_unit(text: str) -> float:
     return size
 
 
+def unit_option(text: str) -> float:
+    """Read the option ``--unit``, see `length_unit`."""
+    try:
+        return length_unit(text)
+    except ValueError as error:
+        raise InputError("--unit", str(error), text) from None
+
+
 def read_clump(path: Path, unit: str | None = None) -> ClumpFile:
-    """Read a clump from a file of spheres.
-
-    Parameters
-    ----------
-    path
-        The file.
-    unit
-        Its unit, see `length_unit`; None: the file's own, or `DEFAULT_UNIT`.
-
-    Raises
-    ------
-    InputError
-        When the file is invalid, has more than one body or another unit, or has a size that no grain has and
-        no unit is given.
-    """
+    """Read a clump from a file of spheres in a unit (see `length_unit`); default: the file's own, or mm."""
     file, place = read_spheres(path), str(path)
     size, source = _unit(file.unit, unit, place)
     if file.bodies is not None and file.body_count > 1:

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from experiments.grains.spheres.column_table import TABLE
+from experiments.grains.spheres.lammps_dump import DUMP
+from experiments.grains.spheres.plain_lines import PLAIN
 from experiments.grains.spheres.sphere_file import LARGEST, Format, SphereFile
-from experiments.grains.spheres.sphere_formats import FORMATS
+from experiments.grains.spheres.vtk_file import VTK
+from experiments.grains.spheres.xml_table import XML
+from experiments.grains.spheres.yade_file import YADE_TEMPLATE, YADE_TEXT
 from experiments.io.errors import InputError
 from experiments.io.files import check_file
 from experiments.io.texts import decoded
 
+FORMATS: tuple[Format, ...] = (DUMP, VTK, YADE_TEXT, YADE_TEMPLATE, XML, PLAIN, TABLE)
+"""Formats in order; the first that recognises a file reads it."""
 HEAD = 65536
 """Number of first bytes of a file that show its format."""
 
 
 def format_of(path: Path) -> Format | None:
-    """Find the format of a file by its content; None if it has none of `FORMATS`.
-
-    Raises
-    ------
-    InputError
-        When there is no such file, or it cannot be read.
-    """
+    """Find the format of a file by its content; None if it has none of `FORMATS`."""
     try:
         check_file(path, LARGEST)
         with path.open("rb") as file:
@@ -38,13 +39,7 @@ def format_of(path: Path) -> Format | None:
 
 
 def read_spheres(path: Path) -> SphereFile:
-    """Read a file of spheres in the format of its content.
-
-    Raises
-    ------
-    InputError
-        When there is no such file, it has none of the formats, or is invalid.
-    """
+    """Read a file of spheres in the format of its content."""
     found = format_of(path)
     if found is not None:
         return found.read(path)

@@ -72,30 +72,19 @@ Row = tuple[int, Sequence[str]]
 
 
 def spheres_of(
-    rows: Iterable[Row], columns: Columns, path: Path, delimiter: str | None = None
+    rows: Iterable[Row], columns: Columns, path: Path, delimiter: str | None = None, kind: str = "line"
 ) -> tuple[NDArray[np.float64], NDArray[np.int64] | None]:
-    """Read rows of spheres.
+    """Read rows of spheres; return centres and radii (n, 4) in the file's unit, and their bodies (n,).
 
-    Returns
-    -------
-    spheres : (n, 4) array
-        Centres and radii in the file's unit.
-    bodies : (n,) array or None
-        Numbers of the bodies; a negative number in the file is a separate sphere.
-
-    Raises
-    ------
-    InputError
-        When a row is too short, a number is invalid, or there is no row.
+    Errors name a row by its `kind`.
     """
     needed = columns.needed()
     values = []
     for line, cells in rows:
-        if len(cells) <= max(needed) or not all(is_number(cells[column], delimiter) for column in needed):
-            raise InputError(f"{path}, line {line}", SPHERE_RULE, " ".join(cells))
-        row = [number(cells[column]) for column in needed]
+        valid = len(cells) > max(needed) and all(is_number(cells[column], delimiter) for column in needed)
+        row = [number(cells[column]) for column in needed] if valid else [np.nan] * 4
         if not np.isfinite(row).all() or row[3] <= 0.0:
-            raise InputError(f"{path}, line {line}", SPHERE_RULE, " ".join(cells))
+            raise InputError(f"{path}, {kind} {line}", SPHERE_RULE, " ".join(cells))
         values.append(row)
     if not values:
         raise InputError(str(path), "has no spheres (x y z r)")

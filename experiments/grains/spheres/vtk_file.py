@@ -36,10 +36,7 @@ def _read(path: Path) -> SphereFile:
         raise InputError(str(path), f"the points need an array radius (or radii, diameter), not only {named}")
     table = np.column_stack([points, np.ravel(values[size])[: len(points)]]).astype(np.float64)
     rows = ((n, [repr(float(value)) for value in row]) for n, row in enumerate(table))
-    try:
-        spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3, size in DIAMETERS), path)
-    except InputError as error:
-        raise InputError(error.place.replace(", line ", ", point "), error.problem, error.value) from None
+    spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3, size in DIAMETERS), path, kind="point")
     body = next((name for name in BODIES if name in values), None)
     bodies = None if body is None else own_bodies(values[body].astype(np.float64))
     return SphereFile(f"VTK file, radii from the array {arrays[size]}", spheres, bodies)

@@ -38,10 +38,7 @@ def _read(path: Path) -> SphereFile:
         raise InputError(str(path), "either all spheres must have a radius, or all a diameter")
     size = next(iter(sizes), "r")
     rows = ((n, [entries[kind] for kind in (*_NEEDED, size)]) for n, entries in enumerate(found, start=1))
-    try:
-        spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3, is_diameter=size == "d"), path)
-    except InputError as error:
-        raise InputError(error.place.replace(", line ", ", sphere "), error.problem, error.value) from None
+    spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3, is_diameter=size == "d"), path, kind="sphere")
     named = {element.get(key) for element in root.iter() for key in ("unit", "units") if element.get(key)}
     lengths = [name for name in named if name in UNITS["length"]]
     if len(lengths) > 1:

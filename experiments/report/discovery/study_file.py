@@ -14,7 +14,7 @@ from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
 from experiments.cases.store.manifest import study_hash
 from experiments.io.files import write_text
 from experiments.io.toml_files import toml_text
-from experiments.measurement.target import Replicated, target_sections
+from experiments.measurement.measured_target import Replicated, target_sections
 from experiments.report.clump_files import gather_clumps
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import tied

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from experiments.calibrate import Campaign, Outcome, calibrate
-from experiments.measurement.profiles import with_profiles
+from experiments.measurement.profile_responses import with_profiles
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import OUTLINE
 from imaging.flank.heap_shape import STATIONS, profile_heights

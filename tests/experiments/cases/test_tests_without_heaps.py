@@ -19,8 +19,8 @@ from experiments.discover.search import Search
 from experiments.export import ExportedTest
 from experiments.io.errors import InputError, StudyError
 from experiments.measurement.measured_file import read_measured
+from experiments.measurement.measured_target import with_measurements
 from experiments.measurement.measured_template import write_measured_template
-from experiments.measurement.target import with_measurements
 from experiments.studyfile import Study, load_study
 
 WriteStudy = Callable[..., Path]
@@ -81,9 +81,9 @@ def test_a_table_to_fill_in_has_the_observables_of_the_test(drum: Study, tmp_pat
     ("row", "message"),
     [
         ("base,1,height,12,mm,", "m.csv:2: observable: must be an observable or 'clogged'"),
-        ("base,1,dynamic_angle,95,deg,", "dynamic_angle lies between 0 and 90 deg in this test"),
-        ("base,1,fill_height,11,,", "fill_height lies between 0.0017 and .* is the unit right"),
-        ("base,1,,,,drum.jpg", "m.csv:2: picture: must be left out of a test without a heap"),
+        ("base,1,dynamic_angle,95,deg,", "dynamic_angle must be between 0 and 90 deg in this test"),
+        ("base,1,fill_height,11,,", "fill_height must be between 0.0017 and .* Check the unit"),
+        ("base,1,,,,drum.jpg", "m.csv:2: picture: this test leaves no heap to photograph"),
     ],
 )
 def test_a_measurement_that_the_test_cannot_give_is_refused(

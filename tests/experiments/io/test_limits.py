@@ -24,7 +24,7 @@ from experiments.io.errors import InputError, Problem, StudyError
 from experiments.io.rows import read_rows
 from experiments.io.toml_files import read_toml
 from experiments.io.units import Quantity
-from experiments.measurement.target import with_measurements
+from experiments.measurement.measured_target import with_measurements
 from experiments.runs.campaign import check_runs
 from experiments.studyfile import load_study
 from imaging import PictureError, measure_photograph
@@ -61,7 +61,7 @@ def test_a_pipe_and_a_device_are_no_files(tmp_path: Path, name: str) -> None:
 
 def test_a_pipe_is_said_to_be_no_regular_file_where_a_picture_is_wanted(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.png")
-    with pytest.raises(PictureError, match="a regular file, got a pipe or a device"):
+    with pytest.raises(PictureError, match="not a regular file"):
         read_picture(tmp_path / "a.png")
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from experiments.io.errors import InputError, StudyError
+from experiments.measurement.measured_target import with_measurements
 from experiments.measurement.profile_files import read_drum_profiles
-from experiments.measurement.profiles import with_profiles
-from experiments.measurement.target import with_measurements
+from experiments.measurement.profile_responses import with_profiles
 from experiments.studyfile import load_study
 
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
@@ -70,7 +70,7 @@ def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
     file(tmp_path, LINE)
     study = load_study(write_study((TUBE, DRUM), (ANGLE, TARGET)))
     with pytest.raises(
-        InputError, match=r"p.csv: replicate: needs profiles of 3 repeats or more, .*, got 1: 1"
+        InputError, match=r"p.csv: replicate: needs profiles of 3 or more replicates, got 1: 1"
     ):
         with_profiles(study)
     with pytest.raises(StudyError, match="with_measurements must first"):
@@ -88,17 +88,17 @@ def test_a_slope_beside_profiles_of_the_same_test_is_told(
     alone, beside = (load_study(write_study((TUBE, DRUM), (ANGLE, TARGET), add=add)) for add in ("", slope))
     assert with_measurements(alone)[1] == ()
     assert with_measurements(beside)[1] == (
-        "dynamic_angle stands beside profiles of the same test: where it was read from them, it counts twice",
+        "dynamic_angle counts twice if it was read from the profiles of the same test",
     )
 
 
 def test_profiles_of_another_test_or_observable_are_refused(write_study: Callable[..., Path]) -> None:
     heap = load_study(write_study((ANGLE, TARGET)))
-    with pytest.raises(InputError, match=r'those of a drum, a "surface", .*, got surface of lifted-cylinder'):
+    with pytest.raises(InputError, match=r'the "surface" of a drum .*, got surface of lifted-cylinder'):
         with_profiles(heap)
     other = load_study(write_study((TUBE, DRUM), (ANGLE, TARGET.replace('"surface"', '"mass_angle"'))))
     with pytest.raises(
-        InputError, match=r'profiles are of the observable "surface" or "outline", got mass_angle'
+        InputError, match=r'profiles need the observable "surface" or "outline", got mass_angle'
     ):
         with_profiles(other)
 

@@ -15,7 +15,7 @@ from experiments.io.errors import InputError, StudyError
 from experiments.measurement.case_observables import measure, observe
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.profile_files import read_heap_profiles
-from experiments.measurement.profiles import with_profiles
+from experiments.measurement.profile_responses import with_profiles
 from experiments.measurement.value_limits import ValueLimits
 from experiments.studyfile import load_study
 from experiments.studyfile.observables import OUTLINE, OUTLINE_STATIONS

@@ -249,7 +249,10 @@ def test_every_wrong_row_is_named_at_once(read) -> None:
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("condition|replicate|observable|value\n", "name the columns"), (HEADER.replace("unit", "units"), "known column")],
+    [
+        ("condition|replicate|observable|value\n", "name the columns"),
+        (HEADER.replace("unit", "units"), "known column"),
+    ],
 )
 def test_a_wrong_header_is_refused(read, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
@@ -344,13 +347,3 @@ def test_the_template_is_valid_once_filled_in(
     assert data.observables == NAMES
     assert {rows.shape for rows in data.values.values()} == {(5, 12)}
     assert data.mean("base")[2] == pytest.approx(0.012, rel=1e-15)
-
-
-def test_a_template_never_overwrites(
-    write_study: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    write_study()
-    monkeypatch.chdir(tmp_path)
-    for expected in (0, 2):
-        assert CliRunner().invoke(app, ["new", "small.toml", "--measured"]).exit_code == expected
-    assert CliRunner().invoke(app, ["new", "absent", "--measured"]).exit_code == 2

@@ -147,7 +147,7 @@ HOSTILE = {
         "calibrate s.toml --device cpu --engine magic --out o", ("engine", "magic"), {"s.toml": SMALL_STUDY}
     ),
     # Measured heaps
-    "no measurement": measured(HEAD, "m.csv", "at least one measured value", "none"),
+    "no measurement": measured(HEAD, "m.csv", "no measured value"),
     "wrong column": measured(HEAD.replace("unit", "units"), "m.csv:1", "known column", "units"),
     "columns missing": measured("a,b\n1,2\n", "m.csv:1", "missing", "a, b"),
     "one unit wrong in every row": measured(
@@ -160,14 +160,14 @@ HOSTILE = {
     "unknown condition": measured(HEAD + "bsae,1,flank_angle,30,deg\n", "m.csv:2", "base", "bsae"),
     "a number in words": measured(HEAD + "base,1,flank_angle,thirty,deg\n", "m.csv:2", "number", "thirty"),
     # Grains
-    "no such shape": Hostile("clump cube:2 --spheres 3", ("SHAPE", "a solid is one of", "cube:2")),
-    "no such file": Hostile("clump g.stl --spheres 3", ("SHAPE", "no mesh file", "g.stl")),
-    "a solid and no number": Hostile("clump sphere:2", ("--spheres", "a number of spheres", "none")),
+    "no such shape": Hostile("clump cube:2 --spheres 3", ("cube:2", "a solid is one of")),
+    "no such file": Hostile("clump g.stl --spheres 3", ("g.stl: no such file",)),
+    "a solid and no number": Hostile("clump sphere:2", ("--spheres", "needs one of the two", "neither")),
     "number and tolerance": Hostile(
         "clump sphere:2 --spheres 2 --tolerance 5%", ("--tolerance", "or", "both")
     ),
     "tolerance of everything": Hostile("clump sphere:2 --tolerance 200%", ("--tolerance", "share", "200%")),
-    "dimensions missing": Hostile("clump ellipsoid:2x3 --spheres 3", ("SHAPE", "ellipsoid:LENGTHx", "2x3")),
+    "dimensions missing": Hostile("clump ellipsoid:2x3 --spheres 3", ("ellipsoid:2x3", "ellipsoid:LENGTHx")),
     "comma for the protrusion": Hostile(
         "clump sphere:2 --spheres 1 --protrusion 0,1mm", ("--protrusion", "comma", "0,1mm")
     ),
@@ -185,23 +185,23 @@ HOSTILE = {
     ),
     "half a mesh": clump(
         PLY + "property float y\nproperty float z\nend_header\n0",
-        "g.ply", "must be a mesh that can be read, got PLY is unexpected length!",
+        "g.ply", "not a readable mesh: PLY is unexpected length!",
         options="--spheres 3", name="g.ply",
     ),
     "a mesh without heights": clump(
         PLY.replace("binary_little_endian", "ascii") + "end_header\n0\n",
-        "g.ply", "must be a mesh that can be read, got a file without 'y'",
+        "g.ply", "not a readable mesh: it has no 'y'",
         options="--spheres 3", name="g.ply",
     ),
     "spheres in metres": clump("x,y,z,r\n0,0,0,0.002\n", "g.txt", "--unit", "0.004 mm"),
-    "spheres apart": clump("0 0 0 1\n9 0 0 1\n", "g.txt", "touch one another", "2 parts"),
+    "spheres apart": clump("0 0 0 1\n9 0 0 1\n", "g.txt", "must touch", "2 separate parts"),
     "a word among spheres": clump("0 0 0 1\n0 0 one 1\n", "g.txt, line 2", "finite", "0 0 one 1"),
     "binary spheres": clump(bytes(range(256)), "g.txt", "UTF-8", "binary"),
     "no unit of length": clump("0 0 0 1\n", "--unit", "unit of length", "kg", options="--unit kg"),
     # Pictures and heaps
-    "no picture": Hostile("angle p.jpg", ("p.jpg", "the picture is a regular file", "no such file")),
-    "a folder as a picture": Hostile("angle .", ("the picture is a regular file", "a folder; name what")),
-    "text as a picture": Hostile("angle p.jpg", ("p.jpg", "a picture", "6 bytes"),
+    "no picture": Hostile("angle p.jpg", ("p.jpg: no such file",)),
+    "a folder as a picture": Hostile("angle .", ("is a folder", "name the files in it")),
+    "text as a picture": Hostile("angle p.jpg", ("p.jpg", "not a picture", "6 bytes"),
                                  {"p.jpg": "hello\n"}),
     "half a crop": Hostile("angle p.jpg --crop 1,2", ("--crop", "four numbers", "1,2"), {"p.jpg": "x"}),
     "unknown fit": Hostile("angle p.jpg --fit wide", ("fit", "flank, middle", "wide"), {"p.jpg": "x"}),

@@ -100,9 +100,9 @@ def test_spheres_of_a_grain_belong_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
-        ("", "heap.csv: needs a file of spheres"),
+        ("", "heap.csv: not a file of spheres"),
         ("x,y,z,r\n", "needs at least one sphere"),
-        ("x,y,z\n1,2,3\n", "needs a file of spheres"),
+        ("x,y,z\n1,2,3\n", "not a file of spheres"),
         ("x,y,z,r\n1,2,3\n", "line 2: a sphere is x y z r"),
         ("x,y,z,r\n1,2,3,0.1\n1,2,3,-1\n", "line 3: a sphere is x y z r: four finite numbers, r > 0"),
         ("x,y,z,r\n1,2,inf,0.1\n", "line 2: a sphere is x y z r"),
@@ -139,7 +139,7 @@ def test_several_cases_run_at_once_and_come_back_in_order(small_study: Study, tm
         ("silent", NO_ANSWER, "the program wrote no result.json"),
         ("nan", NO_ANSWER, "heap.csv, line 2: a sphere is x y z r"),
         ("words", NO_ANSWER, "heap.csv, line 2: a sphere is x y z r"),
-        ("columns", NO_ANSWER, "heap.csv: needs a file of spheres"),
+        ("columns", NO_ANSWER, "heap.csv: not a file of spheres"),
         (
             "status",
             NO_ANSWER,

@@ -328,8 +328,8 @@ def test_plans_tell_what_was_set_aside(
     calibration, _ = caplog.text, caplog.clear()
     planned("discover", TRIAL, "--scale", "bench", tmp_path / "measured.csv")
     for said in (calibration, caplog.text):
-        assert "row 4: height lies between" in said
-        assert "row 5: the picture shows nothing to measure" in said
+        assert "row 4: height must be between" in said
+        assert "row 5: the picture cannot be measured" in said
 
 
 def test_a_heap_is_planned_with_its_settings(write_study: Write) -> None:

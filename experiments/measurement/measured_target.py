@@ -1,4 +1,4 @@
-"""Measurements as the target of a study: from photographs, from a file of measured heaps, from a search."""
+"""The target of a study from photographs, a file of measured heaps, profiles, or a search."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ from experiments.measurement.photographs import (
     measure_pictures,
     require_separate,
     target_sample,
+    used_rows,
 )
-from experiments.measurement.profiles import counted_twice, with_profiles
+from experiments.measurement.profile_responses import counted_twice, with_profiles
 from experiments.measurement.readings import require_same_fit
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
@@ -32,7 +33,7 @@ from imaging import View
 
 @dataclass(frozen=True)
 class Replicated:
-    """An observable that was measured several times under a condition."""
+    """An observable with several measurements under a condition."""
 
     condition: str
     observable: str
@@ -41,19 +42,14 @@ class Replicated:
 
 
 def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
-    """Take the numbers of a study's ``[target]`` from its pictures or its file, and those of its profiles.
+    """Replace pictures, a file and profiles of a study's target by their numbers.
 
     Returns
     -------
     study
-        The same study with mean, sd and n in their stead; as it was where it gives them itself.
+        The same study with numbers; the study itself if it has numbers already.
     notes
-        What a reader must know about the measurements.
-
-    Raises
-    ------
-    InputError
-        When a picture or the file cannot be used, or angles were measured otherwise than the study says.
+        Notes about the measurements.
     """
     study = with_profiles(study)
     taken, notes = _with_source(study)
@@ -61,7 +57,6 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
 
 
 def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
-    """Take the numbers of ``[target]`` from where it says, with notes."""
     section, place = study.target_section, f"{study.file}: target"
     if section is None or section.twin is not None:
         return study, ()
@@ -71,33 +66,27 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
         options = _options(study)
         rows = measure_pictures(find_pictured(study), options)
         sample = target_sample(rows, options, f"{place}.pictures")
-        used = [row for row in rows if row["mean"] and (options.keep_doubtful or not row["doubts"])]
-        note = f"{len(used)} pictures: {', '.join(Path(row['picture']).name for row in used)}"
+        names = [Path(row["picture"]).name for row in used_rows(rows, options)]
+        note = f"{len(names)} pictures: {', '.join(names)}"
         return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), left_out_notes(rows, options)
     if section.file is not None:
         path = study.file.parent / section.file
         measured = read_measured(path, study)
-        found, said = [], list(measured.notes)
+        found, notes = [], list(measured.notes)
         for condition in measured.conditions:
             for name, column in zip(measured.observables, measured.values[condition].T, strict=True):
                 values = column[np.isfinite(column)]
                 if len(values) > 1 and np.ptp(values) > 0.0:
                     found.append(Replicated(condition, name, Sample.of(values)))
                 elif len(values):
-                    said.append(f"{condition}: {name} shows no scatter, so that it is not to be matched")
-        asked = _asked(study, found, said, path)
-        return _given(study, found, f"file {section.file}", asked), tuple(said)
+                    notes.append(f"{condition}: {name} shows no scatter and is not matched")
+        leading = _asked(study, found, notes, path)
+        return _given(study, found, f"file {section.file}", leading), tuple(notes)
     return study, ()
 
 
 def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path: Path) -> Replicated | None:
-    """Observable that ``[target]`` asks a file for; None where it asks for none.
-
-    Raises
-    ------
-    InputError
-        When the file does not have it, with what it has and the notes about it.
-    """
+    """Return the observable that ``[target]`` names, or None; raise `InputError` if the file lacks it."""
     section = study.target_section
     if section is None or not {"observable", "scene"} & section.model_fields_set:
         return None
@@ -106,14 +95,13 @@ def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path
     for one in fitted:
         if (_column(one), _scene(study, one.condition)) == wanted:
             return one
-    has = ", ".join(f"{_column(one)} ({one.condition})" for one in fitted) or "none"
-    rule = f"must be an observable with two values that differ under the target's condition; {path} has {has}"
-    rule += "".join(f"; {note}" for note in notes if section.observable in note)
-    raise InputError(f"{study.file}: target.observable", rule, f"{section.observable} ({section.scene})")
+    has = ", ".join(f"{_column(one)} ({one.condition})" for one in fitted) or "nothing"
+    problem = f"needs two different values under the target's condition; {path} has {has}"
+    problem += "".join(f"; {note}" for note in notes if section.observable in note)
+    raise InputError(f"{study.file}: target.observable", problem, f"{section.observable} ({section.scene})")
 
 
 def _options(study: Study) -> PictureOptions:
-    """Options of the pictures of a study's target."""
     section, fit = study.target_section, study.measurement.fit
     if section is None:
         return PictureOptions(fit)
@@ -122,14 +110,7 @@ def _options(study: Study) -> PictureOptions:
 
 
 def find_pictured(study: Study) -> list[Path]:
-    """Find the photographs of heaps that are the target of a study; empty where it names no photographs.
-
-    Raises
-    ------
-    InputError
-        When its test leaves no heap, the target is not the heap's angle, there are fewer than two
-        photographs, or one is a copy of another.
-    """
+    """Find the photographs of heaps that are the target of a study; empty where it names no photographs."""
     section, place = study.target_section, f"{study.file}: target.pictures"
     if section is None or section.pictures is None:
         return []
@@ -147,10 +128,9 @@ def find_pictured(study: Study) -> list[Path]:
 def target_sections(
     study: Study, measured: Iterable[Replicated], note: str = "", asked: Replicated | None = None
 ) -> tuple[TargetSection | None, tuple[ResponseSection, ...]]:
-    """Turn measurements into a ``[target]`` and ``[[response]]``s; None where none can take part in a fit.
+    """Turn measurements into a ``[target]`` and ``[[response]]``s; the target is None if none can be fitted.
 
-    The one that is asked for leads; else the angle of the first condition that takes part in the fit, or else
-    its first observable.
+    The target is the one asked for, or else the angle of the first fitted condition, or its first observable.
     """
     held_out = _held_out(study)
     order = [TARGET_SCENE, *(condition.name for condition in study.conditions)]
@@ -171,16 +151,16 @@ def target_sections(
 
 
 def _given(study: Study, measured: list[Replicated], note: str, asked: Replicated | None = None) -> Study:
-    """Put measurements in place of where they come from; the responses of the study stay."""
+    """Return the study with measurements as its target, and its own responses."""
     target, responses = target_sections(study, measured, note, asked)
     if target is None:
-        rule = "needs an observable with two values or more under a condition that is not held out"
-        raise InputError(f"{study.file}: target", rule, note)
+        problem = "needs an observable with two values or more under a condition that is not held out"
+        raise InputError(f"{study.file}: target", problem, note)
     return study.with_responses(target, (*responses, *study.response_sections))
 
 
 def _values(study: Study, one: Replicated) -> dict[str, Any]:
-    """Return the values of the section that one is matched by."""
+    """Return the values of a measurement's section."""
     units = {name: each.unit for each in study.measurable for name in (each.name, each.column)}
     unit, column = units[one.observable], _column(one)
     unit = "" if unit == "1" else unit
@@ -200,7 +180,7 @@ def _held_out(study: Study) -> set[str]:
 
 
 def _scene(study: Study, condition: str) -> str:
-    """Scene of a condition: one that changes nothing is the study as it is written."""
+    """Return the scene of a condition: the study's own where the condition changes nothing."""
     same = any(not each.changes for each in study.conditions if each.name == condition)
     return TARGET_SCENE if same else condition
 

@@ -1,4 +1,4 @@
-"""Measured profiles as responses: heights over distance, with the covariance of their repeats."""
+"""Responses from measured profiles, with the covariance of their repeats."""
 
 from __future__ import annotations
 
@@ -18,19 +18,13 @@ from experiments.studyfile.observables import OUTLINE_PROFILE, PROFILES, SURFACE
 from experiments.studyfile.target_section import ResponseSection, TargetSection
 
 OWN = ("note", "twin")
-"""Keys of ``[target]`` that no ``[[response]]`` has."""
+"""Keys of ``[target]`` that ``[[response]]`` lacks."""
 
 
 def with_profiles(study: Study) -> Study:
-    """Put responses of their own in place of profiles: independent directions of measured ones, or heights.
+    """Replace profiles by responses: independent directions of measured ones, or a twin's heights.
 
-    Of a twin's profile, whose cases are still to be simulated, it is the heights at its places. A campaign
-    takes either as one profile again (`experiments.calibrate.directions`).
-
-    Raises
-    ------
-    InputError
-        When a file cannot be read or breaks a rule, or the test does not show the profile.
+    A campaign combines them to one profile again (`experiments.calibrate.directions`).
     """
     target, file = study.target_section, study.file
     sections = {f"{file}: response[{n}]": each for n, each in enumerate(study.response_sections, 1)}
@@ -48,28 +42,27 @@ def with_profiles(study: Study) -> Study:
 
 
 def counted_twice(study: Study) -> tuple[str, ...]:
-    """Say which slopes stand beside profiles of the same test: read from them, they would count twice."""
+    """Name slopes of a test with profiles: a slope that was read from these would count twice."""
     sections = [study.target_section, *study.response_sections]
     given = [section for section in sections if section is not None]
     shown = {section.scene for section in given if section.part_of}
-    told = "stands beside profiles of the same test: where it was read from them, it counts twice"
     return tuple(
-        f"{section.title} {told}"
+        f"{section.title} counts twice if it was read from the profiles of the same test"
         for section in given
         if section.scene in shown and not section.part_of and section.observable.endswith("angle")
     )
 
 
 def _made(study: Study, section: ResponseSection, place: str) -> list[ResponseSection]:
-    """Return the responses that a section is for: itself, or those of its profiles."""
+    """Return the responses of a section: itself, or those of its profiles."""
     profile, twin = section.observable, study.target_section is not None and study.target_section.twin
     if profile not in PROFILES:
         if section.profiles is None:
             return [section]
         known = " or ".join(f'"{name}"' for name in PROFILES)
-        raise InputError(place, f"expected profiles are of the observable {known}", profile)
+        raise InputError(place, f"profiles need the observable {known}", profile)
     if section.profiles is None and not twin:
-        raise InputError(place, f'"{profile}" needs profiles, a file of them, or a twin', "neither")
+        raise InputError(place, f'"{profile}" needs profiles, a file of them, or a twin')
     name = section.scene
     shared: dict[str, Any] = {"scene": name} if "scene" in section.model_fields_set else {}
     shared["part_of"] = f"{profile}_{name}".replace("-", "_") if name != TARGET_SCENE else profile
@@ -77,8 +70,8 @@ def _made(study: Study, section: ResponseSection, place: str) -> list[ResponseSe
     if (profile == SURFACE_PROFILE) != isinstance(scene, Drum) or not (
         isinstance(scene, Drum) or scene.leaves_a_heap
     ):
-        rule = 'expected profiles are those of a drum, a "surface", or of a heap, an "outline"'
-        raise InputError(place, rule, f"{profile} of {scene.name}")
+        problem = 'must be the "surface" of a drum or the "outline" of a heap'
+        raise InputError(place, problem, f"{profile} of {scene.name}")
     if twin:
         return [ResponseSection(**shared, observable=height) for height in PROFILES[profile]]
     path = study.file.parent / str(section.profiles)
@@ -87,12 +80,12 @@ def _made(study: Study, section: ResponseSection, place: str) -> list[ResponseSe
     else:
         found = read_heap_profiles(path, study.measurement.fit, limits_of_test(study, name))
     if len(found.names) < LEAST_PROFILES:
-        rule = f"needs profiles of {LEAST_PROFILES} repeats or more, each with a replicate of its own"
-        raise InputError(f"{path}: replicate", rule, f"{len(found.names)}: {', '.join(found.names)}")
+        problem = f"needs profiles of {LEAST_PROFILES} or more replicates"
+        raise InputError(f"{path}: replicate", problem, f"{len(found.names)}: {', '.join(found.names)}")
     try:
         sample = ProfileSample.of(found.heights, scatter_of_views(found.views))
     except RuleError as error:
-        raise InputError(str(path), f"expected profiles {error.problem}", error.value) from None
+        raise InputError(str(path), f"profiles {error.problem}", error.value) from None
     modes = _modes(sample, found, profile, shared["part_of"])
     return [ResponseSection(**shared, **mode) for mode in modes]
 
