@@ -16,9 +16,9 @@ from experiments.cases import open_workers, with_engine
 from experiments.cases.store.folder import locked
 from experiments.io.errors import InputError
 from experiments.journal.journal import Journal
-from experiments.report.study_companion import Replay
 from experiments.report.corrected_card import write_crossing
 from experiments.report.material_card import CARD
+from experiments.report.study_companion import Replay
 from experiments.runs.campaign import (
     Desk,
     Watch,

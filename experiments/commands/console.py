@@ -36,7 +36,7 @@ ENDED_OUTSIDE = "a process was ended from outside, perhaps for lack of memory: f
 QUIET_START = 2.0
 """Least duration that shows progress [s]."""
 MANIFEST = "study.json"
-"""File of a folder that a run can go on in; `experiments.cases.store.manifest` writes it."""
+"""File of a folder that a run can go on in; `experiments.studyfile.manifest` writes it."""
 
 LINE_EVERY = 10.0
 """Time between two lines of progress where there is no terminal [s]."""

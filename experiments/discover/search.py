@@ -27,13 +27,13 @@ from doe.discrepancy import (
 )
 from experiments.cases import engine_of
 from experiments.cases.engines.key import engine_identity
-from experiments.cases.store.manifest import describe
 from experiments.discover.maker import notes_on
 from experiments.discover.mechanism_files import FORMER_NAMES, library_for, with_maximum
 from experiments.discover.mirror import odd_observables
 from experiments.io.errors import InputError, StudyError
 from experiments.io.texts import nearest_name
 from experiments.studyfile import Study
+from experiments.studyfile.manifest import describe
 from experiments.studyfile.mechanism_factor import MechanismFactor
 
 WITHOUT_EFFECT = (

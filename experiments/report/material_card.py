@@ -10,7 +10,6 @@ import numpy as np
 
 from doe import Region, Sample
 from experiments.calibrate.results import Campaign, OptimumResult
-from experiments.cases.store.manifest import study_hash
 from experiments.io.files import write_text
 from experiments.io.toml_files import toml_text
 from experiments.report.clump_files import gather_clumps
@@ -19,6 +18,7 @@ from experiments.studyfile.campaign import Response
 from experiments.studyfile.card import MATERIAL, SECTIONS
 from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
+from experiments.studyfile.manifest import study_hash
 from experiments.studyfile.solver_section import CORRECTED_FOR, LAWS, SolverSection, written
 
 CARD = "material.toml"

@@ -12,7 +12,6 @@ from typing import Any
 import pandas as pd
 
 from experiments.calibrate.results import Campaign
-from experiments.cases.store.manifest import study_hash
 from experiments.io.files import write_text
 from experiments.io.plain_data import jsonable
 from experiments.io.program_version import program_version
@@ -21,6 +20,7 @@ from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
 from experiments.report.solid import SolidHeap
 from experiments.studyfile import Study
+from experiments.studyfile.manifest import study_hash
 
 LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "opencv-python-headless")
 """Packages whose version may change a number."""

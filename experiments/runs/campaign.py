@@ -21,7 +21,6 @@ from experiments.calibrate.results import StageResult
 from experiments.calibrate.stages import StageHook
 from experiments.cases import Store, Workers, open_folder, run_cases
 from experiments.cases.engines.key import engine_identity
-from experiments.cases.store.manifest import MANIFEST, write_manifest
 from experiments.cases.store.outputs import publishing
 from experiments.cases.workers.own import THIS_MACHINE, watched_by
 from experiments.io.errors import StudyError
@@ -36,6 +35,7 @@ from experiments.report.writer import library_versions
 from experiments.runs.lasting import lasting_files
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import scenes_of
+from experiments.studyfile.manifest import MANIFEST, write_manifest
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
 """Opens the display of one batch, named by its stages, and hands out what its progress is reported to."""

@@ -15,7 +15,6 @@ from experiments.cases.engines.engines import engine_of
 from experiments.cases.show.frames import write_frames
 from experiments.cases.show.movie import NO_MOVIE, write_movie
 from experiments.cases.show.polydata import poly, save
-from experiments.cases.store.manifest import study_hash
 from experiments.cases.workers.own import THIS_MACHINE, OwnWorkers
 from experiments.cases.workers.workers import Workers
 from experiments.io.errors import InputError
@@ -25,6 +24,7 @@ from experiments.measurement.case_observables import Observed, observe
 from experiments.measurement.filling import filling_reached
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.manifest import study_hash
 from experiments.studyfile.observables import observables_of
 from imaging import HeapAngle, PictureError, Snapshot, overlay, save_picture, snapshot
 

@@ -12,12 +12,12 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from experiments.cases.engines.engines import engine_of
-from experiments.cases.store.manifest import MANIFEST, describe, differences, read_manifest, write_manifest
 from experiments.cases.store.outputs import changed_outputs
 from experiments.cases.store.store import Store
 from experiments.io.errors import StoreError
 from experiments.io.files import remove_leftovers
 from experiments.studyfile import Study
+from experiments.studyfile.manifest import MANIFEST, describe, differences, read_manifest, write_manifest
 
 CASES = "cases"
 """Folder of the stored cases."""

@@ -17,10 +17,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from dem_warp.provenance import engine_fingerprint
-from experiments.cases.store.manifest import LARGEST, study_hash, write_manifest
 from experiments.io.errors import StoreError
 from experiments.io.files import read_file, write_text
 from experiments.studyfile import Study
+from experiments.studyfile.manifest import LARGEST, study_hash, write_manifest
 
 LIST = "files.json"
 """File that names every output, with its hash and with what all of them were made from."""

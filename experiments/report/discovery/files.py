@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from doe.discrepancy import Discovery, Settings
-from experiments.cases.store.manifest import study_hash
 from experiments.io.plain_data import jsonable
 from experiments.report.discovery.discovery_page import render_discovery
 from experiments.report.discovery.study_file import write_study_files
@@ -20,6 +19,7 @@ from experiments.report.pictures import HeapPicture
 from experiments.report.solid import SolidHeap
 from experiments.report.writer import PAGE, library_versions, write_files
 from experiments.studyfile import Study
+from experiments.studyfile.manifest import study_hash
 
 
 def write_discovery(

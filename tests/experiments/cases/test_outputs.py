@@ -11,10 +11,10 @@ import pytest
 
 from experiments.cases import open_folder
 from experiments.cases.store.folder import locked
-from experiments.cases.store.manifest import study_hash
 from experiments.cases.store.outputs import DRAFTS, LIST, changed_outputs, publishing, sha256_of
 from experiments.io.errors import StoreError
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.manifest import study_hash
 
 WriteStudy = Callable[..., Path]
 

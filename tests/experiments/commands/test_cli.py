@@ -15,10 +15,10 @@ import pyvista
 from commandline import dem_warp
 
 from experiments import api
-from experiments.cases.store.manifest import study_hash
 from experiments.commands.console import CaseProgress, describe_progress, duration
 from experiments.runs import campaign as run
 from experiments.studyfile import load_study
+from experiments.studyfile.manifest import study_hash
 from imaging import save_picture
 
 WriteStudy = Callable[..., Path]

@@ -18,7 +18,6 @@ from dem_warp import ClumpShape, LiftedCylinder
 from dem_warp.solids import read_mesh
 from doe import DesignError
 from doe.discrepancy import load_bank
-from experiments.cases.store.manifest import read_manifest
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.io.errors import InputError, Problem, StudyError
 from experiments.io.rows import read_rows
@@ -27,6 +26,7 @@ from experiments.io.units import Quantity
 from experiments.measurement.measured_target import with_measurements
 from experiments.runs.campaign import check_runs
 from experiments.studyfile import load_study
+from experiments.studyfile.manifest import read_manifest
 from imaging import PictureError, measure_photograph
 from imaging.photo.picture_file import read_picture
 

@@ -140,7 +140,7 @@ HOSTILE = {
         {"s.toml": SMALL_STUDY + CONDITIONS, "m.csv": HEAD, "b.npz": b"PK\x05\x06" + bytes(18)},
     ),
     "nothing to resume": Hostile(
-        "calibrate s.toml --device cpu --resume --out in", ("in/study.json", "resume", "none"),
+        "calibrate s.toml --device cpu --resume --out in", ("in/study.json", "resume", "cannot be read"),
         {"s.toml": SMALL_STUDY, "in/x": "x"},
     ),
     "no such engine": Hostile(

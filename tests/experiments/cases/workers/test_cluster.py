@@ -201,8 +201,8 @@ def test_a_wrong_profile_is_refused_with_its_place(tmp_path: Path, text: str, sa
 
 
 def test_a_study_may_name_its_cluster_and_its_hash_stays(write_study: Callable[..., Path]) -> None:
-    from experiments.cases.store.manifest import study_hash
     from experiments.runs.choices import chosen_resources, resources_for
+    from experiments.studyfile.manifest import study_hash
 
     plain = load_study(write_study())
     before = study_hash(plain)

@@ -10,29 +10,25 @@ from typing import Any
 
 from experiments.io.errors import StoreError
 from experiments.io.files import read_file, write_text
-from experiments.studyfile import Study
 from experiments.studyfile.places import KeyPath, dotted
+from experiments.studyfile.study import Study
 
 MANIFEST = "study.json"
 """File that says which study the folder belongs to."""
-
 
 LARGEST = 10_000_000
 """Bytes of the largest file of this kind that is read."""
 
 
 def describe(study: Study) -> dict[str, Any]:
-    """Everything that a study says of its results, its clumps included, as JSON-able data.
-
-    Where its cases are simulated changes none of them.
-    """
+    """Return all of a study that its results depend on, its clumps included, as JSON-able data."""
     digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.files]
     document = {key: value for key, value in study.document.items() if key != "cluster"}
     return {"study": document, "scale": study.scale, "clump_sha256": digests}
 
 
 def study_hash(study: Study) -> str:
-    """SHA-256 of everything that a study says, which its outputs carry."""
+    """Return the SHA-256 of what a study describes, which its outputs carry."""
     text = json.dumps(describe(study), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -71,5 +67,5 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         manifest: dict[str, Any] = json.loads(read_file(path, LARGEST))
         return manifest
     except (OSError, ValueError, RecursionError):
-        rule = f"a folder to resume must hold the {MANIFEST} of the run that made it"
-        raise StoreError(str(path), rule, "none that can be read") from None
+        hint = "Only a folder with the file that a run has written can be resumed."
+        raise StoreError(str(path), "cannot be read", hint=hint) from None
