@@ -81,12 +81,14 @@ from experiments.discover.mechanism_files import library_for
 from experiments.export import EXPORTERS
 from experiments.grains.spheres import read_clump
 from experiments.studyfile import load_study
+from experiments.studyfile.loading import build_study
+from experiments.studyfile.places import Places
 trial = pathlib.Path("experiments/studies/trial/study.toml")
 magnets, corners = {"magnetism": {"magnetic_force": "0.5 mN"}}, {"screening": {"design": "corners"}}
 study = load_study(trial, "bench", {"mechanism": magnets, "campaign": corners})
 paper = load_study(scale="bench")
 written = {key: value for key, value in paper.document.items() if key != "target"}  # no heap, no angle
-jar = paper.with_document(written | {"scene": {"jar": {"diameter": "28 mm", "height": "28 mm"}}})
+jar = build_study(written | {"scene": {"jar": {"diameter": "28 mm", "height": "28 mm"}}}, Places(paper.file, {}))
 app(["new", str(trial), "--measured"], standalone_mode=False)
 [measured] = pathlib.Path(".").rglob("*-measured.csv")
 pathlib.Path("ball.txt").write_text("ball", encoding="utf-8")

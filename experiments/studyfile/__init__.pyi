@@ -1,8 +1,9 @@
 """The public names: each is loaded with its module when it is first used."""
 
 from .conditions import Condition
+from .loading import BUCKWHEAT, load_card, load_study, study_scales
 from .new_study import write_template
-from .study import BUCKWHEAT, Study, StudyError, load_card, load_study, study_scales
+from .study import Study, StudyError
 
 __all__ = [
     "BUCKWHEAT",

@@ -1,15 +1,13 @@
-"""Studies: everything that a person configures, one TOML file.
+"""Studies: everything that a person configures, frozen, with typed setters.
 
-A study file is read once: its scale is merged over it, units are converted, every rule is checked. Any breach
-is a `StudyError` with the rule, the value received and the file, line and key. What comes out is frozen.
+`experiments.studyfile.loading` builds a study from its file. A setter returns another study.
 """
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,19 +17,15 @@ from dem_warp import Case
 from doe import Factor
 from experiments.io.errors import StudyError
 from experiments.io.texts import nearest_name
-from experiments.io.toml_files import read_toml
 from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
-from experiments.studyfile.card import card_document, with_material
 from experiments.studyfile.cluster_section import ClusterSection
-from experiments.studyfile.conditions import BASE, Condition, Conditions, free_of, under_condition
+from experiments.studyfile.conditions import BASE, Condition, Conditions, free_of
 from experiments.studyfile.engine_section import EngineSection
 from experiments.studyfile.factor_section import (
     FactorSection,
     FactorTable,
-    check_one_home,
     merge,
     natural_value,
-    with_factor_values,
 )
 from experiments.studyfile.observables import Observable, measurable
 from experiments.studyfile.physics import GrainCountError, Physics, Scene
@@ -43,9 +37,6 @@ from experiments.studyfile.setters import changed, revised
 from experiments.studyfile.solver_section import SolverSection
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
 from imaging import FITS
-
-BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"
-"""The study that is meant when none is named: the paper's buckwheat."""
 
 
 class MeasurementSection(Section):
@@ -115,7 +106,7 @@ class Study(Physics):
     """The workers that simulate the cases; left out: this machine's own."""
 
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
-    _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))
+    _places: Places = PrivateAttr(default_factory=lambda: Places(Path(), {}))
     _fixed: frozenset[str] = PrivateAttr(default=frozenset())
     _under: dict[str, Study] = PrivateAttr(default_factory=dict)
     _target: Target | None = PrivateAttr(default=None)
@@ -191,7 +182,7 @@ class Study(Physics):
         Raises
         ------
         StudyError
-            When there is no such condition, or it breaks a rule.
+            When there is no such condition.
         """
         known = {each.name: each for each in self.conditions}
         if condition not in known:
@@ -199,22 +190,7 @@ class Study(Physics):
             raise StudyError(str(self.file), rule, condition)
         if not known[condition].changes:
             return self
-        if condition not in self._under:
-            document, fixed = under_condition(self._document, known[condition])
-            study = _build(document, replace(self._places, condition=condition))
-            study._fixed = self._fixed | fixed
-            self._under[condition] = study
         return self._under[condition]
-
-    def with_document(self, document: Mapping[str, Any]) -> Study:
-        """Build the study that another document describes, as if it stood in the same file.
-
-        Raises
-        ------
-        StudyError
-            When the document breaks a rule.
-        """
-        return _build(dict(document), self._places)
 
     def with_target(self, target: Target) -> Study:
         """Return the same study, whose cases must match something else."""
@@ -258,7 +234,7 @@ class Study(Physics):
         study = self._changed(
             document, target_section=target, response_sections=sections, measurement=reading
         )
-        study._match()
+        study.match()
         return study
 
     def _row(self, section: ResponseSection) -> dict[str, Any]:
@@ -319,7 +295,7 @@ class Study(Physics):
         except ValueError as error:
             raise StudyError(str(self.file), first_problem(error)) from None
         study = self._changed(document, **dict(physics), factor_sections=sections)
-        _check_restitution(study)
+        check_restitution(study)
         return study
 
     def _changed(self, document: dict[str, Any], **fields: Any) -> Study:
@@ -336,8 +312,8 @@ class Study(Physics):
         titles = [section.title for section in (self.target_section, *self.response_sections) if section]
         check_factor_names(names, self._places, self.scenes.values(), titles)
 
-    def _match(self) -> None:
-        """Build the target."""
+    def match(self) -> None:
+        """Build the target of the responses."""
         self._check_names()
         held_out = [condition.name for condition in self.conditions if condition.held_out]
         target, responses = self.target_section, self.response_sections
@@ -409,71 +385,7 @@ class Study(Physics):
         return {section.name: section for section in self.factor_sections}
 
 
-def load_study(
-    path: str | Path | None = None, scale: str | None = None, changes: Mapping[str, Any] | None = None
-) -> Study:
-    """Read and check a study file.
-
-    Parameters
-    ----------
-    path
-        The TOML file; None: the paper's buckwheat.
-    scale
-        Name of a ``[scale.NAME]`` table to merge over the rest; None: the study as written.
-    changes
-        Sections that a caller merges over that, table by table, as written in a study file.
-
-    Raises
-    ------
-    StudyError
-        When the file cannot be read or breaks a rule: the rules, the values received, and their places.
-    """
-    path = BUCKWHEAT if path is None else Path(path)
-    text, document = read_toml(path)
-    places = Places.read(path, text, scale)
-    scales = _scales(path, document)
-    document.pop("scale", None)
-    if scale is not None:
-        if scale not in scales:
-            rule = f"must have the scale that is asked for, {nearest_name(scale, list(scales))}"
-            raise StudyError(str(path), rule, scale)
-        document = merge(document, scales[scale])
-    return _build(with_material(merge(document, changes or {}), path.parent), places)
-
-
-def load_card(path: Path) -> Study:
-    """Read a material card as the study of its own test, at the values that it chose.
-
-    Raises
-    ------
-    StudyError
-        When the file cannot be read, is no card, or does not say which test it was fitted to.
-    """
-    text, card = read_toml(path)
-    return _build(card_document(card, path), Places.read(path, text))
-
-
-def _build(document: dict[str, Any], places: Places) -> Study:
-    """Build a study, and each of its conditions, so that a wrong one is named at once."""
-    sections = validated(FactorTable, {"factor": document.get("factor", [])}, places).factor
-    names = [section.name for section in sections]
-    check_factor_names(names, places)
-    check_one_home(document, sections, places)
-    middle = with_factor_values(document, sections, {}) | {"factor": sections}
-    study = validated(Study, middle, places, natural_value=partial(natural_value, sections))
-    study._document, study._places = document, places
-    _check_restitution(study)
-    for name in study.condition_sections:
-        study.under(name)
-    for name in study.response_scenes:
-        if name == TARGET_SCENE or name in study.condition_sections:
-            problem = "is the name of the study's own scene or of a condition"
-            raise StudyError(places.of(("response-scene", name)), problem, hint="Choose another name.")
-    study._match()
-    return study
-
-
-def _check_restitution(study: Study) -> None:
+def check_restitution(study: Study) -> None:
     """Refuse a factor that varies a restitution which the laws make nothing of."""
     for section in study.factor_sections if study.solver.laws.damping_rate is not None else ():
         if any(path[-1] == "restitution" for path in section.paths):
@@ -481,22 +393,3 @@ def _check_restitution(study: Study) -> None:
             problem = f"varies a restitution, which the damping {damping!r} ignores"
             place = f"{study.file}: factor {section.name}"
             raise StudyError(place, problem, hint="Remove the factor.")
-
-
-def study_scales(path: str | Path | None = None) -> tuple[str, ...]:
-    """Names of the scales that a study file has.
-
-    Raises
-    ------
-    StudyError
-        When the file cannot be read.
-    """
-    path = BUCKWHEAT if path is None else Path(path)
-    return tuple(_scales(path, read_toml(path)[1]))
-
-
-def _scales(path: Path, document: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-    scales = document.get("scale", {})
-    if not isinstance(scales, Mapping) or not all(isinstance(table, Mapping) for table in scales.values()):
-        raise StudyError(f"{path}: scale", "must hold tables, [scale.NAME]", scales)
-    return scales

@@ -14,7 +14,7 @@ from experiments.cases import OwnWorkers
 from experiments.cli import app
 from experiments.runs.campaign import check_runs
 from experiments.runs.search import OUTCOMES, Job, run_search
-from experiments.studyfile import Study, load_study, study
+from experiments.studyfile import Study, load_study, loading
 from experiments.studyfile.observables import PHOTOGRAPHED
 from experiments.studyfile.places import Places
 
@@ -66,13 +66,13 @@ def test_a_search_on_photographs_needs_what_they_show(tmp_path: Path) -> None:
 def test_a_search_builds_its_study_and_each_condition_when_a_file_is_read_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    built, build = [], study._build
+    built, build = [], loading.build_study
 
     def counted(document: dict[str, Any], places: Places) -> Study:
         built.append(places)
         return build(document, places)
 
-    monkeypatch.setattr(study, "_build", counted)
+    monkeypatch.setattr(loading, "build_study", counted)
     data = tmp_path / "measured.csv"
     data.write_text("condition,replicate,observable,value,unit\nbase,1,t75,400,ms\n", encoding="utf-8")
     code, _, err = discover(data, "--dry-run")

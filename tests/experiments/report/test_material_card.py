@@ -85,7 +85,7 @@ def test_a_card_tells_what_was_fitted_and_what_is_as_good(card: Path, campaign: 
 
 
 def test_a_card_says_which_other_solver_made_it(campaign: Campaign, study: Study) -> None:
-    other = study.with_document(study.document | {"engine": {"command": "python3 solver.py"}})
+    other = study.with_engine({"command": "python3 solver.py"})
     assert material_card(campaign, campaign.optimum, other)["fitted"]["engine"] == "python3 solver.py"
     assert "engine" not in material_card(campaign, campaign.optimum, study)["fitted"]
 

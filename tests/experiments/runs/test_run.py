@@ -238,7 +238,7 @@ def test_a_bank_goes_when_another_grain_or_test_is_run_and_stays_while_it_serves
 @pytest.mark.usefixtures("_without_report", "engine")
 def test_a_bank_that_a_person_brought_is_left_alone(study: Study, tmp_path: Path) -> None:
     run_campaign(study, tmp_path / "out")
-    other = study.with_document(study.document | {"wall": study.document["wall"] | {"poisson_ratio": 0.2}})
+    other = load_study(study.file, study.scale, {"wall": {"poisson_ratio": 0.2}})
     leave_bank(other, tmp_path / "out", table=False)
     run_campaign(study, tmp_path / "out", resume=True)
     assert (tmp_path / "out" / BANK).is_file()

@@ -19,9 +19,9 @@ from experiments.discover.search import Search
 from experiments.io.errors import StudyError
 from experiments.report.study_facts import study_facts
 from experiments.studyfile import load_study
+from experiments.studyfile.loading import BUCKWHEAT
 from experiments.studyfile.new_study import write_template
 from experiments.studyfile.solver_section import SolverSection, written
-from experiments.studyfile.study import BUCKWHEAT
 
 WriteStudy = Callable[..., Path]
 

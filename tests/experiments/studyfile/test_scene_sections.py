@@ -11,7 +11,7 @@ import pytest
 from dem_warp import DrawDown, Drum, Hopper
 from experiments.io.errors import StudyError
 from experiments.studyfile import load_study
-from experiments.studyfile.study import BUCKWHEAT
+from experiments.studyfile.loading import BUCKWHEAT
 
 WriteStudy = Callable[..., Path]
 
