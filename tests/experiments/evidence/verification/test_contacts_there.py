@@ -56,3 +56,14 @@ def test_a_pair_in_yade_goes_the_same_way_as_ours(tmp_path: Path) -> None:
     found = difference(setup, setup.ours("cpu"), yade_contacts.follow(setup, tmp_path))
     # forces are double there and here; the rotation of a history is approximate there
     assert max(found.values()) < 1e-6
+
+
+@pytest.mark.program("liggghts")
+def test_a_sphere_that_comes_to_rest_tells_the_two_resistances_to_rolling_apart(tmp_path: Path) -> None:
+    spring, directional = (
+        next(one for one in liggghts_contacts.paths(PRESETS[name]) if one.path.name == "plate, rolling")
+        for name in ("liggghts", "liggghts-cdt")
+    )
+    theirs = liggghts_contacts.follow(spring, tmp_path)
+    assert max(difference(spring, spring.ours("cpu"), theirs).values()) < TOLERANCE
+    assert min(difference(spring, directional.ours("cpu"), theirs).values()) > TOLERANCE
