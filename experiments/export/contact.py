@@ -1,4 +1,4 @@
-"""Contacts of a case, and their translation into the terms of another code."""
+"""Contacts of a case, and terms of other codes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dem_warp.model import ContactCoefficients
 
 @dataclass(frozen=True)
 class Contact:
-    """Two surfaces that touch.
+    """Contact of two surfaces.
 
     Raises
     ------
@@ -23,14 +23,14 @@ class Contact:
     second: Material
     """Their materials."""
     surface: Interaction
-    """Properties of the pair."""
+    """Properties of the pair of materials."""
     coefficients: ContactCoefficients
     """Coefficients of the contact law."""
     radius: float
     mass: float
-    """Reduced ones [m], [kg], for codes whose resistance to rolling asks for them."""
+    """Reduced radius [m] and mass [kg]."""
     normal_damping: str = "tsuji"
-    """Choice that the coefficients' damping is for: a number made of the restitution, or a rate [1/s]."""
+    """Law of the coefficients' damping, which is a number made of the restitution, or a rate [1/s]."""
 
     def __post_init__(self) -> None:
         if names := [mechanism.name for mechanism in self.coefficients.mechanisms]:
@@ -38,14 +38,14 @@ class Contact:
 
 
 def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, Contact]:
-    """Contacts of a case whose walls are of one material: of grains with grains, and with walls.
+    """Return the contacts of grains with grains and with walls, which are of one material.
 
     The radius is that of a grain's largest sphere [m], the mass that of a grain [kg].
 
     Raises
     ------
     ValueError
-        When the case has a mechanism beside the base law.
+        When the case has a mechanism.
     """
     grain, wall = case.grain_material, case.scene.wall_material
     among, with_wall = case.contacts(wall)
@@ -58,19 +58,19 @@ def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, C
 
 @dataclass(frozen=True)
 class Term:
-    """One number in the words of another code."""
+    """Number in the terms of another code."""
 
     name: str
-    """Its name there."""
+    """Name in the code."""
     value: float
     unit: str
     """SI; "1" for a number without one."""
     formula: str
-    """Its formula in the terms of the case."""
+    """Formula in the terms of the case."""
     source: str
     """Document that defines it."""
 
 
 def values(terms: tuple[Term, ...]) -> dict[str, float]:
-    """Values of terms by their names."""
+    """Return the values of terms by their names."""
     return {term.name: term.value for term in terms}

@@ -109,7 +109,7 @@ class Lift:
 
     @property
     def is_of_spheres(self) -> bool:
-        """Whether every grain is one sphere."""
+        """True when every grain is one sphere."""
         return all(template.shape.sphere_count == 1 for template in self.templates)
 
     @property

@@ -1,4 +1,4 @@
-"""Rows of the README that every input of the lifted cylinder has, and what none of them has."""
+"""Rows of the README that all inputs of the lifted cylinder share, and what no input has."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from experiments.export.sizes import sizes_text
 
 
 def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
-    """Say what became of the test's parts, where all codes do alike; the tube is a prism or exact."""
+    """Return the translation of the parts of the test that all codes share; the tube is a prism or exact."""
     case, scene = lift.case, lift.scene
     scale = case.numerics.modulus_scale
     shear, softened = case.grains.material.shear_modulus, case.grain_material.shear_modulus
@@ -16,7 +16,7 @@ def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
     sizes = sizes_text(case.grains)
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
     rate = f"{lift.rain_rate:.4g} grains a second, {scene.rain_speed:g} m/s"
-    slower = "" if lift.rain_rate == scene.rain_rate else " (so many find a place at random)"
+    slower = "" if lift.rain_rate == scene.rain_rate else " (the most that find a place at random)"
     prism = f"prism of {SIDES} sides that touch it from outside"
     return (
         Translated("shear modulus of the grains", f"{shear:.6g} Pa", f"{softening}; calibrated so, keep it"),
@@ -39,7 +39,7 @@ def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
 
 
 def lift_warnings(lift: Lift, ends_in_time: bool = False) -> tuple[str, ...]:
-    """Name what no input of the lifted cylinder has; some can end at a given time."""
+    """Name what no input has; some can end at a given time."""
     scene = lift.scene
     left_out = {
         f"air_drag = {scene.air_drag:g} /s": scene.air_drag > 0.0,

@@ -39,7 +39,7 @@ _ROWS = (
         "this driver",
         "",
         "written for MercuryDPM 1.0.0 alpha of July 2024; no run there is on record. Put this folder "
-        "beside `Drivers/Clump/ClumpHeaders`, and build lift.cpp as the drivers there are",
+        "next to `Drivers/Clump/ClumpHeaders`, and build lift.cpp as the drivers there are",
     ),
     Translated(
         "clumps",

@@ -93,7 +93,7 @@ class Rain:
 
 
 def plain(numbers: Iterable[float], digits: int = 9) -> str:
-    """Write numbers with so many digits, with spaces between."""
+    """Write numbers with spaces between, each with some significant digits."""
     return " ".join(f"{number:.{digits}g}" for number in numbers)
 
 

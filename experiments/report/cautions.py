@@ -72,7 +72,7 @@ def _filling(campaign: Campaign, study: Study) -> Iterator[Caution]:
         scene = study.case({}, 0, str(name)).scene
         reached = filling_reached(scene, {"fill_height": float(rows["fill_height"].median())})
         if reached is not None and filling_missed(scene, reached):
-            yield Caution(say("caution.filling", told=filling_text(scene, reached)), "summary")
+            yield Caution(say("caution.filling", filling=filling_text(scene, reached)), "summary")
 
 
 def _small(grains: float | None) -> Iterator[Caution]:

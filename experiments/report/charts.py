@@ -120,7 +120,6 @@ def verification_chart(result: VerificationResult, response: Response) -> Chart:
 
 
 def _critical_values(screen: ScreenResult, alpha: float) -> dict[str, float]:
-    """Critical |t| of the campaign's own level, of 0.05, and of 0.05 shared among all columns."""
     values = {f"p = {level:g}": screen.critical_t(level) for level in sorted({alpha, 0.05}, reverse=True)}
     return values | {"Bonferroni 0.05": screen.critical_t(0.05, bonferroni=True)}
 

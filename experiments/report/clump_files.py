@@ -1,4 +1,4 @@
-"""Files of the grain that a document names, gathered beside it."""
+"""Files of the grain that a document names, copied next to it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The corrected card of a bridge, and the folder that it stands in."""
+"""Corrected card of a bridge, and its folder."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from experiments.studyfile.card import BRIDGE, MATERIAL, SECTIONS, files_of
 from experiments.studyfile.factor_section import with_factor_values
 
 RESULTS, RUNS = "bridge.json", "runs.csv"
-"""Files beside the card: all that was found, and every run of the other solver."""
+"""Files next to the card: all that was found, and every run of the other solver."""
 
 HEAD = """\
 # Material card, corrected by dem-warp bridge for {engine}.
-# Its values hold in that solver, with the clump and the estimator that stand below, and nowhere else.
+# Its values hold in that solver, with the clump and the estimator below, and nowhere else.
 
 """
 
@@ -68,17 +68,16 @@ def _fresh(crossing: Crossing) -> dict[str, Any]:
 
 
 def _bridge(crossing: Crossing) -> dict[str, Any]:
-    """Say which solver the values hold in, and how far from its own surface the card was."""
     carried, unit = crossing.carried, crossing.source.unit
-    told: dict[str, Any] = {"engine": crossing.engine, "runs": len(crossing.runs)}
-    told |= {"beyond_design": crossing.extent > 1.0, "card_point": crossing.source.point}
+    facts: dict[str, Any] = {"engine": crossing.engine, "runs": len(crossing.runs)}
+    facts |= {"beyond_design": crossing.extent > 1.0, "card_point": crossing.source.point}
     if carried is not None:
         ends = carried.intervals()
-        told |= {
+        facts |= {
             "shift": quantity_text(carried.shift, unit),
             "shift_interval": [quantity_text(end, unit) for end in ends["shift"]],
             "scale": short(carried.scale),
             "scale_interval": [short(end) for end in ends["scale"]],
             "noise": quantity_text(carried.noise, unit),
         }
-    return told
+    return facts

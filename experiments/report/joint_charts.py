@@ -13,10 +13,10 @@ from experiments.report.surfaces import REGION_FILL, Slice, add_design, add_leve
 from experiments.studyfile.campaign import Response
 
 COLORS = (BLUE, ORANGE, PURPLE, SKY, MUTED)
-"""Of the responses, in order."""
+"""Colours of the responses, in order."""
 
 OPACITY = 0.20
-"""Of a response's own band."""
+"""Opacity of a response's own band."""
 
 
 def joint_charts(
@@ -67,6 +67,5 @@ def _plane_chart(
 
 
 def _translucent(color: str) -> str:
-    """Return a colour that others show through."""
     red, green, blue = (int(color[place : place + 2], 16) for place in (1, 3, 5))
     return f"rgba({red},{green},{blue},{OPACITY})"

@@ -63,13 +63,11 @@ def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> d
 
 
 def _solver(solver: SolverSection) -> dict[str, Any]:
-    """Say which laws the values hold for, and which solver, where a bridge corrected some for the study's."""
     corrected = solver.corrected_for if solver.corrected_for != solver.card_solver else None
     return {LAWS: written(solver.laws)} | ({CORRECTED_FOR: corrected} if corrected else {})
 
 
 def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
-    """Say what the values were fitted to, and how well they do."""
     measurement, numerics = study.measurement, study.numerics
     facts: dict[str, Any] = {
         "outcome": campaign.outcome.value,
@@ -93,7 +91,6 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
 
 
 def _response(campaign: Campaign, response: Response) -> dict[str, Any]:
-    """Target of a response, and what fresh cases gave."""
     facts: dict[str, Any] = {"observable": response.observable, "scene": response.scene}
     if campaign.target is not None:
         facts |= sample_table(campaign.target.responses[response.name], response.unit)
@@ -111,7 +108,6 @@ def sample_table(sample: Sample, unit: str) -> dict[str, Any]:
 
 
 def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
-    """Chosen value of every kept factor, and the range of those that are as good."""
     region, found = optimum.region, bool(optimum.region.mask.any())
     parameters = {section.name: section.parameter for section in study.factor_sections}
     return {
@@ -128,7 +124,6 @@ def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
 
 
 def _surfaces(campaign: Campaign) -> dict[str, Any]:
-    """Runs that each response's surface was fitted to, and the terms that stayed: enough to fit it again."""
     if campaign.surface is None:
         return {}
     return {name: surface_table(found.reduced) for name, found in campaign.surface.responses.items()}

@@ -24,7 +24,6 @@ def other_codes_chapter(study: Study, optimum: OptimumResult) -> Chapter:
 
 
 def _terms_table(name: str, case: Case[Any]) -> Table:
-    """Lay out the terms of one code; its note says what it has not got, and what stands for it."""
     rows = [
         {"subject": subject, "name": term.name, "value": f"{term.value:.6g}"}
         | {"unit": "" if term.unit == "1" else term.unit, "formula": term.formula}

@@ -129,7 +129,6 @@ def drawn_heap(
 
 
 def _picture(case: Mapping[str, Any], study: Study, result: CaseResult, kept: tuple[str, ...]) -> HeapPicture:
-    """Draw a heap in the view whose angle is nearest to the mean over all views."""
     (angle, view), _, image = drawn_heap(study, result)
     values = "".join(f", {name} = {trimmed(case[name], 3)}" for name in kept)
     return HeapPicture(

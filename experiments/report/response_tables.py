@@ -45,7 +45,6 @@ def goals_table(campaign: Campaign) -> Table:
 
 
 def _goal(campaign: Campaign, response: Response) -> dict[str, Any]:
-    """Facts about a response; what is not known yet is left out."""
     name = response.name
     scene = "own" if response.scene == TARGET_SCENE else response.scene
     scene += ", held out" if response.held_out else ""
@@ -80,7 +79,6 @@ def response_tables(campaign: Campaign) -> dict[str, Table]:
 
 
 def _shrinkage_table(campaign: Campaign, joint: JointFit) -> Table:
-    """Lay out how the region shrinks with each response, and what each takes to simulate."""
     scenes = {response.name: response.scene for response in campaign.responses}
     table = joint.shrinkage.copy()
     for column in ("share", "alone", "with_first"):
@@ -107,7 +105,6 @@ def _shrinkage_table(campaign: Campaign, joint: JointFit) -> Table:
 
 
 def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
-    """Lay out the directions of the factors, from the best known to the least."""
     table, left = joint.directions.copy(), open_directions(joint, settings).index
     table["span"] *= 100.0
     names = [factor.name for factor in joint.factors]
@@ -129,7 +126,6 @@ def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
 
 
 def _effects_table(result: ScreeningResult, alpha: float) -> Table:
-    """Lay out what every factor does to every response, in the screening."""
     screens = {name: found.screen for name, found in result.responses.items()}
     frames = {name: screen.table[["effect", "p"]].add_prefix(f"{name} ") for name, screen in screens.items()}
     table = pd.concat(frames.values(), axis=1).rename_axis("factor")
@@ -142,7 +138,6 @@ def _effects_table(result: ScreeningResult, alpha: float) -> Table:
 
 
 def _surfaces_table(result: SurfaceResult) -> Table:
-    """Lay out how well a quadratic describes every response."""
     fits = {name: (fit.full, fit.reduced) for name, fit in result.responses.items()}
     rows = {
         name: {
@@ -167,5 +162,4 @@ def _surfaces_table(result: SurfaceResult) -> Table:
 
 
 def _terms(names: str) -> Markup:
-    """Typeset the terms of a model."""
     return Markup(", ").join(term(name) for name in names.split(", "))

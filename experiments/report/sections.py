@@ -153,7 +153,6 @@ def _optimum(context: Context, result: OptimumResult) -> Chapter:
 
 
 def _responses(context: Context) -> list[Chapter]:
-    """Build the chapter of several responses; none where there is one."""
     campaign = context.campaign
     if campaign.surface is None or campaign.optimum is None or campaign.optimum.joint is None:
         return []

@@ -304,5 +304,5 @@ def _with_responses(
 
 
 def p_marks(p: pd.Series, alpha: float = SIGNIFICANT) -> list[str]:
-    """Marks of rows whose p value is below a level."""
+    """Return the marks of rows whose p value is below a level."""
     return ["strong" if value < alpha else "" for value in p]

@@ -40,20 +40,17 @@ def study_facts(study: Study) -> dict[str, str]:
 
 
 def _part_text(part: Mapping[str, Any]) -> str:
-    """Describe a part of the walls as the study writes it."""
-    told = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in part.items())
-    return told or "varied by factors"
+    text = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in part.items())
+    return text or "varied by factors"
 
 
 def _laws_text(laws: ContactLaws) -> str:
-    """Name a set of laws, and every choice of it that is not the base law's."""
     base = EDEM.to_dict()
     own = {law: value for law, value in laws.to_dict().items() if value != base[law]}
-    told = ", ".join(f"{law.replace('_', ' ')} {value}" for law, value in own.items())
-    return f"{laws.name}: {told or 'the base law'}"
+    text = ", ".join(f"{law.replace('_', ' ')} {value}" for law, value in own.items())
+    return f"{laws.name}: {text or 'the base law'}"
 
 
 def _scene_text(scene: Mapping[str, Any]) -> str:
-    """Describe a scene as the study writes it."""
     [(kind, settings)] = scene.items()
     return ", ".join([kind, *(f"{key.replace('_', ' ')} {value}" for key, value in settings.items())])

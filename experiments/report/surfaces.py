@@ -92,7 +92,6 @@ def residual_charts(surface: Surface, response: Response) -> list[Chart]:
 
 
 def _strongest(planes: list[Slice]) -> Slice:
-    """Return the plane along the two factors with the largest coded slopes."""
     slopes = planes[0].surface.coded_coefficients.abs()
     return max(planes, key=lambda plane: slopes.get(plane.x, 0.0) + slopes.get(plane.y, 0.0))
 
@@ -210,7 +209,6 @@ def add_level(figure: go.Figure, grid: SurfaceGrid, name: str, level: float, col
 def _add_contours(
     figure: go.Figure, grid: SurfaceGrid, name: str, lines: dict, color: str, width: int, **more: Any
 ) -> None:
-    """Draw lines of equal fitted response."""
     more |= {"showscale": False, "showlegend": True, "line": {"color": color, "width": width}}
     figure.add_contour(x=grid.x, y=grid.y, z=grid.mean, name=name, contours=lines, **more)
 
@@ -269,5 +267,4 @@ def _add_runs(figure: go.Figure, x: Any, y: pd.Series) -> None:
 
 
 def _extent(design: Design) -> float:
-    """Coded half width that shows every run."""
     return max(1.0, float(design.points.abs().to_numpy().max())) * 1.05

@@ -68,7 +68,7 @@ def write_files(
     made_by: Mapping[str, Any],
     tables: Mapping[str, pd.DataFrame],
 ) -> None:
-    """Write a page, and beside it its results, between the study and what made them, and its tables."""
+    """Write a page, its results with the study and the provenance, and its tables."""
     about = {
         "name": study.name,
         "file": study.file.name,

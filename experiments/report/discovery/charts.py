@@ -140,8 +140,8 @@ def _comparison(found: Discovery, terms: Terms, column: int) -> Chart:
         range=[-0.6, len(rows) - 0.4],
         showgrid=False,
     )
-    told = terms.observables[observable]
-    caption = f"{capital(told.title)}: {told.definition.rstrip('.')}."
+    shown = terms.observables[observable]
+    caption = f"{capital(shown.title)}: {shown.definition.rstrip('.')}."
     return Chart(f"compared-{observable}", caption, figure, height="low")
 
 

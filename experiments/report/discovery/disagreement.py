@@ -14,11 +14,11 @@ from experiments.report.kit.texts import say
 from experiments.studyfile.observables import Instrument
 
 CLEAR = 0.05
-"""Adjusted p value below which a residual is told."""
+"""Adjusted p value below which a residual is reported."""
 CLEARLY = 2.0
-"""Standard errors that the mean over the conditions is off where it is told."""
+"""Error of a mean over the conditions that is reported, at least [standard errors]."""
 SHOWN = 4
-"""Observables that are told of."""
+"""Observables that are reported at most."""
 ALIKE = 1.0
 """Standard deviations that a residual has at least where it is one of all conditions."""
 LEANING = 2.0
@@ -40,23 +40,23 @@ def misses(found: Discovery, terms: Terms) -> list[str]:
     conditions say so.
     """
     fit = found.closest or found.base
-    return [] if fit is None else [one.told(terms) for one in _missed(found, fit)]
+    return [] if fit is None else [one.sentence(terms) for one in _missed(found, fit)]
 
 
 def standing_out(found: Discovery, terms: Terms) -> list[str]:
     """Say which single means a base that agrees on the whole misses."""
-    return [] if found.base is None else [one.told(terms) for one in _standing_out(found, found.base)]
+    return [] if found.base is None else [one.sentence(terms) for one in _standing_out(found, found.base)]
 
 
 def conventions(found: Discovery, terms: Terms) -> list[str]:
     """Say which conventions or slips would look as what is missed does, one an instrument."""
     fit = found.closest or found.base
-    told: dict[str, list[str]] = {}
+    alike: dict[str, list[str]] = {}
     for one in [] if fit is None else _missed(found, fit):
         instrument = terms.observables[one.observable].instrument
         if instrument is not None:
-            told.setdefault(_CONVENTIONS[instrument], []).append(spaced(one.observable))
-    return [say("misses.same", names=enumeration(names), text=text) for text, names in told.items()]
+            alike.setdefault(_CONVENTIONS[instrument], []).append(spaced(one.observable))
+    return [say("misses.same", names=enumeration(names), text=text) for text, names in alike.items()]
 
 
 def leaning(fit: Fit | None, terms: Terms) -> str:
@@ -65,9 +65,9 @@ def leaning(fit: Fit | None, terms: Terms) -> str:
     leans = dict(_leaned_on(use, terms) for use in uses if use.deviations > LEANING)
     if not leans:
         return ""
-    told = (f"{what} ({trimmed(by, 2)} standard deviations)" for what, by in leans.items())
+    leant = (f"{what} ({trimmed(by, 2)} standard deviations)" for what, by in leans.items())
     which = "that instrument" if len(leans) == 1 else "those instruments"
-    return say("misses.leaning", what=enumeration(told), which=which)
+    return say("misses.leaning", what=enumeration(leant), which=which)
 
 
 def _leaned_on(use: CalibrationUse, terms: Terms) -> tuple[str, float]:
@@ -131,7 +131,7 @@ class _Miss:
     error: str
     """Distribution that the deviations are of."""
 
-    def told(self, terms: Terms) -> str:
+    def sentence(self, terms: Terms) -> str:
         """``t55 is 7 ms late in all conditions``, or where it is off most."""
         factor, unit = terms.scale(self.observable)
         late = terms.observables[self.observable].instrument is Instrument.FILM
@@ -160,7 +160,6 @@ def _missed(found: Discovery, fit: Fit) -> list[_Miss]:
 
 
 def _standing_out(found: Discovery, fit: Fit) -> list[_Miss]:
-    """Find the observables with means beyond chance, the clearest first."""
     clear = np.where(np.nan_to_num(fit.adjusted_p, nan=1.0) < CLEAR, np.abs(fit.residuals), 0.0)
     order = np.argsort(-clear.max(axis=0))
     return [_worst(found, fit, int(at)) for at in order[:SHOWN] if clear[:, at].any()]
@@ -229,7 +228,7 @@ def with_and_without(found: Discovery, terms: Terms) -> str:
         Verdict.UNKNOWN: "something is missing that the library does not explain",
         Verdict.NOT_IDENTIFIABLE: "the data cannot tell",
     }
-    told = [
+    verdicts = [
         words.get(one.verdict, f"{one.verdict.value}: {terms.titles(one.named)}") for one in (rest, found)
     ]
-    return say("misses.both", without=told[0], with_them=told[1])
+    return say("misses.both", without=verdicts[0], with_them=verdicts[1])

@@ -47,7 +47,6 @@ TITLES = {
 def _chapter(
     name: str, tables: Mapping[str, Table] | None = None, charts: Mapping[str, Sequence[Chart]] | None = None
 ) -> Chapter:
-    """Build a chapter that a template of its name fills."""
     return Chapter(name, TITLES[name], tables or {}, charts or {}, template=f"discovery/{name}.html.j2")
 
 
@@ -73,7 +72,7 @@ def render_discovery(
     pictures
         Heaps to show side by side.
     files
-        Study files with the mechanism added that lie beside the page.
+        Study files with the mechanism added, in the folder of the page.
     provenance
         What made the numbers: names and values, nested as they come.
     further
@@ -127,9 +126,8 @@ def _missed(found: Discovery, terms: Terms) -> dict[str, Any]:
 
 
 def _further_reason(found: Discovery, terms: Terms) -> str:
-    """The rule that gave the verdict, where its sentence does not say it."""
-    told = found.candidates[0].objection if found.candidates and found.verdict is Verdict.UNKNOWN else ""
-    return "" if told and told in found.reason else reason_sentence(found, terms)
+    said = found.candidates[0].objection if found.candidates and found.verdict is Verdict.UNKNOWN else ""
+    return "" if said and said in found.reason else reason_sentence(found, terms)
 
 
 @dataclass(frozen=True)
@@ -142,7 +140,6 @@ class Card:
 
 
 def _cards(found: Discovery, terms: Terms) -> list[Card]:
-    """Build the figures that the sentence of the verdict does not tell."""
     cards, verdict = [], found.verdict
     if found.base and verdict not in (Verdict.NONE, Verdict.UNKNOWN):
         df, limit = found.base.degrees_of_freedom, trimmed(found.base.q_limit, 3)
@@ -161,7 +158,6 @@ def _cards(found: Discovery, terms: Terms) -> list[Card]:
 
 
 def _chapters(found: Discovery, terms: Terms) -> list[Chapter]:
-    """Build the chapters that this discovery has something for."""
     compared = charts.comparison_charts(found, terms)
     built = {
         "gap": _gap(found, terms),

@@ -21,7 +21,7 @@ PIXELS = 800
 WIDEST = 1000
 """Columns of a picture in the page, at most."""
 
-BESIDE, ABOVE, BELOW = 0.2, 0.12, 0.06
+ASIDE, ABOVE, BELOW = 0.2, 0.12, 0.06
 """Free space to either side of a heap, above its summit and below its plate, in its widths."""
 
 
@@ -35,10 +35,10 @@ class _Window:
 
     @classmethod
     def around(cls, width: float, height: float) -> _Window:
-        return cls((0.5 + BESIDE) * width, height + ABOVE * width, BELOW * width)
+        return cls((0.5 + ASIDE) * width, height + ABOVE * width, BELOW * width)
 
     def over(self, unit: float) -> _Window:
-        """The window in another unit."""
+        """Return the window in another unit."""
         return _Window(self.reach / unit, self.above / unit, self.below / unit)
 
 
@@ -89,7 +89,6 @@ def simulated_heaps(models: Mapping[str, CaseResult], condition: str, study: Stu
 
 
 def _size(angle: ReposeAngle) -> tuple[float, float]:
-    """Width and height of a heap [pixels]."""
     return float(np.ptp(angle.outline.position)), float(angle.outline.height.max())
 
 

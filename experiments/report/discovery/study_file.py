@@ -37,7 +37,7 @@ LEAST_SEEN = 0.5
 
 
 def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path) -> list[Path]:
-    """Write a study file for each model that the verdict leaves standing, and its clumps beside it.
+    """Write a study file for each model that the verdict leaves possible, with its clumps.
 
     A tie gives a file ``study-with-NAME.toml`` a mechanism, a pair one file, nothing named none.
     """
@@ -72,7 +72,6 @@ def extended_document(
 
 
 def _standing(found: Discovery) -> list[tuple[list[tuple[str, Interval]], float | None]]:
-    """Models to write, with their headings: the chosen one, or each of a tie."""
     models: list[Candidate | Fit] = [found.chosen] if found.chosen else []
     if found.verdict is Verdict.TIE:
         models = [*tied(found)]
@@ -80,7 +79,6 @@ def _standing(found: Discovery) -> list[tuple[list[tuple[str, Interval]], float 
 
 
 def _range(mechanism: MechanismFactor, size: Interval) -> tuple[float, float]:
-    """The interval of a size within the mechanism's range, or the whole range where it holds nothing."""
     low, high = (float(f"{end:.{DIGITS}g}") for end in (size.low, size.high))
     low, high = max(low, mechanism.null), min(high, mechanism.maximum)
     return (low, high) if low < high else (mechanism.null, mechanism.maximum)

@@ -50,7 +50,7 @@ def frames(found: Discovery) -> dict[str, pd.DataFrame]:
 
 
 def compared_frame(found: Discovery) -> pd.DataFrame:
-    """Measured means beside what the base and the chosen model say: one row a condition and observable."""
+    """Compare measured means with the base and the chosen model: one row a condition and observable."""
     data = found.data
     rows = []
     for at, value in np.ndenumerate(data.means):
@@ -229,7 +229,6 @@ def data_table(found: Discovery, terms: Terms) -> Table:
 def _laid_out(
     name: str, items: Sequence[T], entries: Entries[T], caption: str, note: str, marks: Sequence[str] = ()
 ) -> Table:
-    """Lay out one item a row, each column with what it takes from an item."""
     frame = pd.DataFrame([{column.key: take(one) for column, take in entries.items()} for one in items])
     return make_table(name, frame, list(entries), caption, note, marks or None)
 
@@ -257,13 +256,11 @@ def _before_after_row(both: BeforeAfter) -> dict[str, object]:
 
 
 def _ends(name: str, ends: Interval | None) -> dict[str, float | None]:
-    """Value, low and high end of an interval as columns; empty ones where there is none."""
     value, low, high = (ends.value, ends.low, ends.high) if ends else (None, None, None)
     return {name: value, f"{name}_low": low, f"{name}_high": high}
 
 
 def _by_condition(drift: Drift) -> Iterator[tuple[str, float, float]]:
-    """Condition, fitted value and standard error."""
     return zip(drift.conditions, drift.values, drift.standard_errors, strict=True)
 
 

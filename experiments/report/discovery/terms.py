@@ -89,7 +89,6 @@ class Terms:
         return f"{spaced(observable)} [{unit}]" if unit else spaced(observable)
 
     def _unit(self, name: str) -> str:
-        """Unit as it follows a number."""
         unit = self.mechanisms[name].unit.replace("^2", "²").replace("^3", "³")
         return {"1": "", "deg": "°"}.get(unit, f" {unit}")
 

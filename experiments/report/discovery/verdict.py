@@ -45,7 +45,7 @@ BOTH = " + "
 """Sign between the two effects of one model in the next experiment."""
 
 SHOWN_RIVALS = 2
-"""Refused mechanisms whose objection is told."""
+"""Refused mechanisms that are reported with their objection."""
 
 
 def headline(found: Discovery, terms: Terms) -> str:
@@ -67,19 +67,17 @@ def verdict_sentence(found: Discovery, terms: Terms) -> str:
     slips = [*slip_sentences(found), with_and_without(found, terms)] if found.slips else []
     if found.without_slips is not None and slip_decides(found):
         rest = found.without_slips
-        told = _found(rest, terms)
-        return " ".join([*slips, say("verdict.slips_first", told=told)])
+        return " ".join([*slips, say("verdict.slips_first", verdict=_found(rest, terms))])
     return " ".join([_found(found, terms), *slips])
 
 
 def _found(found: Discovery, terms: Terms) -> str:
-    """The sentence of a verdict, and what the model that it tells of leans on."""
-    told = found.base if found.verdict is Verdict.NONE else found.chosen or found.closest
-    return " ".join(filter(None, [_SENTENCES[found.verdict](found, terms), leaning(told, terms)]))
+    model = found.base if found.verdict is Verdict.NONE else found.chosen or found.closest
+    return " ".join(filter(None, [_SENTENCES[found.verdict](found, terms), leaning(model, terms)]))
 
 
 def reason_sentence(found: Discovery, terms: Terms) -> str:
-    """The rule that gave the verdict, as a sentence."""
+    """Return the rule that gave the verdict, as a sentence."""
     return f"{capital(_one_name(found.reason, terms)).rstrip('.')}."
 
 
@@ -140,19 +138,16 @@ def _none(found: Discovery, terms: Terms) -> str:
 
 
 def _single_means(found: Discovery, terms: Terms) -> str:
-    """Say why a marked mean is no contradiction to a model that lacks nothing."""
-    told = standing_out(found, terms)
-    return say("verdict.single_means", told=" And ".join(told)) if told else ""
+    means = standing_out(found, terms)
+    return say("verdict.single_means", means=" And ".join(means)) if means else ""
 
 
 def _drifting(found: Discovery, terms: Terms) -> str:
-    """Say why a drift of a factor is no contradiction to a model that lacks nothing."""
     drifting = [terms.factors[drift.factor].label for drift in found.drifts if drift.p_value < DRIFTS]
     return say("verdict.drifting", names=enumeration(drifting)) if drifting else ""
 
 
 def _added(found: Discovery, terms: Terms) -> str:
-    """``Adding X at a removed c % of the excess; held out, Q fell from d to e``."""
     if found.chosen is None:
         return reason_sentence(found, terms)
     sizes = terms.sizes(found.chosen.mechanisms, found.chosen.sizes)
@@ -202,13 +197,11 @@ def _unknown(found: Discovery, terms: Terms) -> str:
 
 
 def _q_and_p(base: Fit) -> str:
-    """Say how much a base misses, and how often chance does as much in the clearest of its tests."""
     q, freedom = trimmed(base.q, 3), fixed(base.degrees_of_freedom, 0)
     return say("verdict.misfit", q=q, freedom=freedom, p=p_clause(base.p_value))
 
 
 def _beyond(answer: Answer, terms: Terms) -> str:
-    """Say by which of the questions to a base its residuals are beyond the noise, a clause."""
     statistic = {
         Question.SIZE: "Q is",
         Question.FALL: f"{terms.title(answer.mechanism)} would lower Q by",
@@ -247,8 +240,8 @@ def _room(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
 
 
 def _rivals(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
-    told = found.candidates[:1] if found.verdict is Verdict.UNKNOWN else ()
-    refused = [c for c in found.candidates if not c.admitted and c.objection and c not in told]
+    closest = found.candidates[:1] if found.verdict is Verdict.UNKNOWN else ()
+    refused = [c for c in found.candidates if not c.admitted and c.objection and c not in closest]
     for rival in refused[:SHOWN_RIVALS]:
         objection = _one_name(rival.objection, terms).rstrip(".")
         were = "were" if len(rival.mechanisms) > 1 else "was"

@@ -36,7 +36,7 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def significant(value: float | None, digits: int = 4) -> str:
-    """Write a number with so many significant digits, without an exponent between 1e-6 and 1e9."""
+    """Write a number with some significant digits, without an exponent between 1e-6 and 1e9."""
     if value is None or not math.isfinite(value):
         return MISSING
     size = abs(value)
@@ -47,7 +47,7 @@ def significant(value: float | None, digits: int = 4) -> str:
 
 
 def trimmed(value: float | None, digits: int = 6) -> str:
-    """Write a number with at most so many significant digits, without zeros at its end."""
+    """Write a number with at most some significant digits, without zeros at its end."""
     text = significant(value, digits)
     whole, point, decimals = text.partition(".")
     if not point or "e" in decimals:
@@ -61,7 +61,7 @@ def unit_sign(unit: str) -> str:
 
 
 def quantity(value: float | None, unit: str, decimals: int = 2) -> str:
-    """Write a response with its unit: angles with so many decimals, others with four digits."""
+    """Write a response with its unit: angles with some decimals, others with four digits."""
     if unit == "deg":
         return f"{fixed(value, decimals)}°"
     return f"{significant(value)} {unit_sign(unit)}".rstrip()
@@ -217,7 +217,7 @@ def term(name: str) -> Markup:
 
 
 def equation(coefficients: Mapping[str, float], digits: int = 5) -> Markup:
-    """Typeset a fitted polynomial as a right-hand side, each coefficient with so many significant digits."""
+    """Typeset a fitted polynomial as a right-hand side, its coefficients with some significant digits."""
     parts: list[Markup] = []
     for name, value in coefficients.items():
         sign = "−" if value < 0.0 else "+" if parts else ""

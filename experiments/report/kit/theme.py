@@ -46,7 +46,7 @@ DARK: Mapping[str, str] = MappingProxyType(
 """The same in the dark."""
 
 DIVERGING = ("#b35806", "#fdb863", "#f7f7f7", "#92c5de", "#2166ac")
-"""Orange below, blue above: even steps of lightness, told apart by colour-blind readers."""
+"""Orange below, blue above: even steps of lightness, distinguished by colour-blind readers."""
 
 _DARK_DIVERGING = ("#f5a04a", "#9c5a17", "#262c35", "#2c6a94", "#6fb7f0")
 

@@ -1,7 +1,7 @@
 """The published numbers of the buckwheat study, the same numbers recomputed, and the misprints between them.
 
 The paper is "Analysis and calibration of parameters of buckwheat grain based on the stacking experiment"; its
-tables lie in the folder ``paper`` beside this file, digits as printed. What statistics can recompute, the
+tables are in the folder ``paper`` here, digits as printed. What statistics can recompute, the
 public functions of `doe` recompute here from the paper's own runs.
 """
 
@@ -136,7 +136,7 @@ def surface(model: str = "quadratic") -> Surface:
 
 
 def comparison() -> pd.DataFrame:
-    """Set every recomputable number that the paper prints beside its recomputed value.
+    """Compare every recomputable number that the paper prints with its recomputed value.
 
     A row a printed number: place, item, printed (text), recomputed, slack (how far the recomputed value may
     move within the rounding of the printed numbers that it is made of; 0 where those are runs) and agrees

@@ -35,11 +35,11 @@ class Truth:
 
 
 TRUTHS = {"tilted-bench.csv": Truth({"mu_gg": 0.55, "mu_gw": 0.45, "e_gg": 0.35}, {"plate_tilt": 5.0})}
-"""By the file beside this one that the heaps are in, whose head says the same."""
+"""Truth of each file of heaps in this folder; the head of the file has it too."""
 
 
 class TrialCompanion(Companion):
-    """The truth behind the shipped data, shown beside what the search found in them."""
+    """Truth behind the shipped data, next to the findings of the search."""
 
     def discovery_chapters(self, found: Discovery, terms: Terms, data: Path) -> Sequence[Chapter]:
         """Chapter on what was hidden, where the data are shipped ones; a copy of them counts."""
@@ -52,7 +52,7 @@ class TrialCompanion(Companion):
 
 
 def truth_table(truth: Truth, found: Discovery, terms: Terms) -> Table:
-    """Lay out what was hidden beside what was found: effects, then factors."""
+    """Compare what was hidden with what was found: effects, then factors."""
     fit = found.chosen if found.named else found.base
     effects = dict(zip(fit.mechanisms, fit.sizes, strict=True)) if fit else {}
     rows = []

@@ -107,7 +107,7 @@ def test_meshes_close_around_the_tube_and_have_the_plates_area() -> None:
     assert area == pytest.approx(math.pi * 0.02**2, rel=1e-12)
 
 
-# ---- what each is told -------------------------------------------------------------------------------------
+# ---- inputs ------------------------------------------------------------------------------------------------
 
 
 def test_liggghts_gets_laws_masses_and_seeds() -> None:
@@ -152,10 +152,10 @@ def test_an_input_that_nobody_has_run_says_so_at_the_top(code: str, tmp_path: Pa
     translation = export_input(test, code, approximate=True)
     write_export(test, code, translation, tmp_path)
     run = code in ("liggghts", "lammps", "yade")
-    told = f"has not been run in {EXPORTERS[code].code}"
+    wanted = f"has not been run in {EXPORTERS[code].code}"
     for file in (translation.main, "README.md"):
         top = (tmp_path / file).read_text(encoding="utf-8").splitlines()[:6]
-        assert any(told in line for line in top) is not run
+        assert any(wanted in line for line in top) is not run
 
 
 def test_sheets_have_the_spheres_and_the_time_step() -> None:
@@ -177,8 +177,8 @@ def test_a_sheet_tells_the_whole_test() -> None:
     mixture = ShapeMixture((SPHERE, ROD), (0.25, 0.75))
     test = exported("edem", mixture, plate_diameter=0.05, tilt=math.radians(5.0))
     text = export_input(test, "edem").files["values.md"]
-    for told in ("a disc of 50 mm", "0.25 of shape 1, 0.75 of shape 2", "gravity to (0.855, 0, -9.773) m/s2"):
-        assert told in text
+    for part in ("a disc of 50 mm", "0.25 of shape 1, 0.75 of shape 2", "gravity to (0.855, 0, -9.773) m/s2"):
+        assert part in text
     assert "-0.000000" not in text
 
 

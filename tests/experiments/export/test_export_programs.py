@@ -82,24 +82,24 @@ def test_the_rain_is_ours_grain_by_grain(code: str, inputs: dict[str, Translatio
 
 @pytest.mark.parametrize("code", PROGRAMS)
 def test_mass_and_inertia_are_those_of_the_union(code: str, inputs: dict[str, Translation]) -> None:
-    told = json.loads(inputs[code].files["test.json"])
-    assert told["masses"] == pytest.approx([GRAIN.density * CLUMP.volume])
-    assert told["moments"][0] == pytest.approx(GRAIN.density * CLUMP.volume * CLUMP.inertia_over_mass)
+    written = json.loads(inputs[code].files["test.json"])
+    assert written["masses"] == pytest.approx([GRAIN.density * CLUMP.volume])
+    assert written["moments"][0] == pytest.approx(GRAIN.density * CLUMP.volume * CLUMP.inertia_over_mass)
     spheres = np.loadtxt(io.StringIO(inputs[code].files["clump-1.csv"]), delimiter=",", skiprows=1)
     assert spheres == pytest.approx(np.column_stack([CLUMP.centers, CLUMP.radii]), abs=1e-11)
-    assert told["time_step"] == exported("yade").case.time_step
+    assert written["time_step"] == exported("yade").case.time_step
     assert inputs[code].warnings == ()
     ast.parse(inputs[code].files["lift.py"])
 
 
 def test_yade_gets_a_contact_for_every_pair(inputs: dict[str, Translation]) -> None:
-    told = json.loads(inputs["yade"].files["test.json"])
+    written = json.loads(inputs["yade"].files["test.json"])
     among, wall = (values(EXPORTERS["yade"].contact_terms(c)) for c in contacts_of(_case("yade"), 1e-3, 1e-5))
-    for found, terms in zip(told["contacts"], (among, wall, wall), strict=True):
+    for found, terms in zip(written["contacts"], (among, wall, wall), strict=True):
         assert {name: found[name] for name in terms} == terms
-    assert [found["maxBendPl"] for found in told["contacts"]] == [0.1, 0.2, 0.2]
+    assert [found["maxBendPl"] for found in written["contacts"]] == [0.1, 0.2, 0.2]
     # a softened modulus leaves softened: E of the grains is 2 G (1 + v) / 4
-    assert told["materials"][0]["young"] == pytest.approx(2.0 * 3e5 * 1.25 / 4.0)
+    assert written["materials"][0]["young"] == pytest.approx(2.0 * 3e5 * 1.25 / 4.0)
 
 
 def test_a_law_that_a_code_lacks_is_refused_by_name() -> None:
@@ -155,8 +155,8 @@ def test_a_thick_tube_is_closed_and_faces_the_grains() -> None:
 def test_a_plate_with_an_end_leaves_as_triangles() -> None:
     for code, laws in PROGRAMS.items():
         translation = export_input(exported(laws, plate_diameter=0.05), code)
-        told = json.loads(translation.files["test.json"])
-        assert told["plate"], code
+        written = json.loads(translation.files["test.json"])
+        assert written["plate"], code
     assert "plate.obj" in translation.files
 
 
@@ -173,8 +173,8 @@ def test_mercury_gets_springs_and_dashpots_that_come_to_ours() -> None:
 def test_mercury_gets_every_number_that_its_driver_asks_for() -> None:
     files = export_input(exported("edem"), "mercurydpm", approximate=True).files
     asked = set(re.findall(r"test::(\w+)", files["lift.cpp"]))
-    told = set(re.findall(r"(\w+)(?:\[\])*(?:\[3\])? = ", files["test.h"])) | {"Contact"}
-    assert asked <= told
+    written = set(re.findall(r"(\w+)(?:\[\])*(?:\[3\])? = ", files["test.h"])) | {"Contact"}
+    assert asked <= written
 
 
 # ---- the course of the test, which the programs have in themselves ----------------------
@@ -185,9 +185,9 @@ def course(tmp_path: Any, monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Tra
     """A course as a program has it, of a tube that is filled to its rim."""
     for name, text in inputs["yade"].files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    told = json.loads((tmp_path / "test.json").read_text(encoding="utf-8"))
-    told["phases"] |= {"strike_off": True, "duration": None}
-    (tmp_path / "test.json").write_text(json.dumps(told), encoding="utf-8")
+    written = json.loads((tmp_path / "test.json").read_text(encoding="utf-8"))
+    written["phases"] |= {"strike_off": True, "duration": None}
+    (tmp_path / "test.json").write_text(json.dumps(written), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
     exec(template("course"), names)

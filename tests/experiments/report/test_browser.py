@@ -195,15 +195,15 @@ def test_a_map_has_room_for_the_numbers_of_its_columns(opened: Opened) -> None:
     maps = opened.page.evaluate(
         """() => [...document.querySelectorAll(".sweep.broad")].map((box) => ({
           columns: Number(box.style.getPropertyValue("--columns")),
-          told: document.getElementById(box.querySelector(".plot").id).data[0].x.length,
+          drawn: document.getElementById(box.querySelector(".plot").id).data[0].x.length,
           width: box.querySelector(".plot").clientWidth,
           em: parseFloat(getComputedStyle(document.documentElement).fontSize),
         }))"""
     )
     assert bool(maps) is ("search" in opened.page.url)
     for each in maps:
-        assert each["columns"] == each["told"]
-        if opened.width == 390:  # 2.6 em a column beside nine for the names of the rows
+        assert each["columns"] == each["drawn"]
+        if opened.width == 390:  # 2.6 em a column, and nine for the names of the rows
             assert each["width"] >= (9.0 + 2.6 * each["columns"]) * each["em"] - 1.0
 
 

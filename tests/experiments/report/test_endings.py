@@ -61,8 +61,8 @@ def test_every_ending_is_a_clear_report(
     assert campaign.outcome is outcome
     page = read_page(render_page(campaign, study))
     assert page.mismatches == []
-    told = campaign.reason if campaign.verification is None else verdict_sentence(campaign)
-    assert f"{HEADLINES[outcome]}. {prose(told)}" in page.text
+    reason = campaign.reason if campaign.verification is None else verdict_sentence(campaign)
+    assert f"{HEADLINES[outcome]}. {prose(reason)}" in page.text
     reached = set(campaign.stages)
     assert reached <= set(page.ids)
     assert not {"climb", "surface", "optimum", "verification"} - reached & set(page.ids)

@@ -1,4 +1,4 @@
-"""Verdict, cautions, values and texts to paste: in words, from a campaign's own numbers, each told once."""
+"""Verdict, cautions, values and texts to paste: from a campaign's own numbers, each printed once."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NUMBER = re.compile(r"(?<![\w.])[−-]?\d+\.\d+")
 """A number with decimals, as sentences have it."""
 
 
-def told(campaign: Campaign, study: Study) -> str:
+def caution_texts(campaign: Campaign, study: Study) -> str:
     return "\n".join(caution.text for caution in cautions(campaign, study))
 
 
@@ -71,26 +71,26 @@ def test_cautions_come_before_the_values(page_text: str) -> None:
 
 def test_a_bench_campaign_is_cautioned(changed: Callable[..., Study], heaps: Callable) -> None:
     study = changed(load_study(None, "bench"), selection={"keep": ("E", "F")})
-    text = told(calibrate(study, heaps()), study)
+    text = caution_texts(calibrate(study, heaps()), study)
     assert "The target was simulated, not measured." in text
     assert f"fewer than {FEW_GRAINS} grains" in text
     assert "The shear modulus was softened." in text
 
 
 def test_a_surface_that_predicts_poorly_is_cautioned(campaign: Campaign, study: Study) -> None:
-    assert "predicts new runs poorly" not in told(campaign, study)
+    assert "predicts new runs poorly" not in caution_texts(campaign, study)
     found = campaign.surface.leading
     fit = SimpleNamespace(r2_predicted=0.17, r2_adjusted=found.reduced.r2_adjusted)
     surface = replace(campaign.surface, responses={"angle": replace(found, reduced=fit)})
-    text = told(replace(campaign, surface=surface), study)
+    text = caution_texts(replace(campaign, surface=surface), study)
     assert "The surface of the angle predicts new runs poorly: its predicted R² is 0.17" in text
 
 
 def test_a_campaign_at_full_size_is_not_cautioned_of_its_grains(campaign: Campaign, study: Study) -> None:
-    assert f"fewer than {FEW_GRAINS}" in told(campaign, study)  # the analytic heaps say 400
+    assert f"fewer than {FEW_GRAINS}" in caution_texts(campaign, study)  # the analytic heaps say 400
     large = replace(campaign, cases=campaign.cases.assign(grain_count=2490.0))
-    assert f"fewer than {FEW_GRAINS}" not in told(large, study)
-    assert "softened" not in told(large, study)
+    assert f"fewer than {FEW_GRAINS}" not in caution_texts(large, study)
+    assert "softened" not in caution_texts(large, study)
 
 
 def test_the_values_to_enter_are_those_of_every_factor(campaign: Campaign, study: Study, page) -> None:

@@ -44,10 +44,10 @@ def test_any_other_name_will_do(write_study: Callable[..., Path], name: str) -> 
 
 
 def test_the_reserved_names_are_those_of_the_tables(campaign: Campaign, study: Study) -> None:
-    beside = {"cases", "climb", "contour", "surface_design", "verification"}
+    tables = {"cases", "climb", "contour", "surface_design", "verification"}
     factors = {factor.name for factor in campaign.factors}
     responses = {response.name for response in campaign.responses}
     taken = RESERVED | factors | responses | set(study.scene.observables)
-    for name in beside:
+    for name in tables:
         columns = {re.sub(r"_coded$", "", column) for column in campaign.tables()[name]}
         assert columns <= taken, name

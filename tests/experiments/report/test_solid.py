@@ -13,7 +13,7 @@ from experiments.report.solid import MOST_SPHERES, PIXELS, STEPS, SolidHeap
 
 
 def heap(grains: int, spheres: int = 9) -> CaseResult:
-    """Grains of so many spheres at random places of a box of 50 mm."""
+    """Grains of some spheres at random places of a box of 50 mm."""
     clump = np.tile([0.0, 0.0, 0.0, 0.002], (1, spheres, 1))
     clump[0, :, 0] = np.linspace(-0.001, 0.001, spheres)
     return CaseResult(

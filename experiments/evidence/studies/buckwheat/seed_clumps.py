@@ -37,7 +37,7 @@ class Recipe:
     """Largest distance that a sphere may pass the solid's surface by [m]."""
 
     def solid(self) -> trimesh.Trimesh:
-        """A pyramid of the measured size whose three faces are bent inward or outward [m]."""
+        """Return A pyramid of the measured size whose three faces are bent inward or outward [m]."""
         turns = np.arange(6) * math.pi / 3.0
         radii = np.where(np.arange(6) % 2, 0.5 * self.face * CORNER_RADIUS, CORNER_RADIUS)
         ring = np.column_stack([radii * np.cos(turns), radii * np.sin(turns), np.zeros(6)])

@@ -62,16 +62,16 @@ def test_no_share_is_told_of_an_excess_that_is_not_there(
     found = discovered(Verdict.TIE)
     assert found.base is not None
     quiet = replace(found, base=replace(found.base, q=found.base.degrees_of_freedom - 1.0))
-    for one, told in ((found, True), (quiet, False)):
+    for one, words in ((found, True), (quiet, False)):
         page = read_page(render_discovery(one, whole_study, terms, Settings()))
-        assert ("explained-chart" in page.charts) is told
-        assert (page.rows("candidates")[0][2][1] is not None) is told
+        assert ("explained-chart" in page.charts) is words
+        assert (page.rows("candidates")[0][2][1] is not None) is words
     sentence = verdict_sentence(replace(quiet, verdict=Verdict.UNKNOWN), terms)
     assert "Contact adhesion comes closest (it leaves Q = 48.3), but " in sentence
 
 
 @pytest.mark.parametrize(
-    ("clearest", "told"),
+    ("clearest", "words"),
     [
         (Answer(Question.SIZE, 91.3, 73.7), "Q is 91.3 (limit 73.7)"),
         (
@@ -85,22 +85,23 @@ def test_no_share_is_told_of_an_excess_that_is_not_there(
     ],
 )
 def test_a_gap_is_told_by_the_test_that_sees_it(
-    clearest: Answer, told: str, discovered: Discovered, terms: Terms
+    clearest: Answer, words: str, discovered: Discovered, terms: Terms
 ) -> None:
     found = discovered(Verdict.UNKNOWN)
     assert found.base is not None
     # Q itself lies within its limit, which must not be called beyond the noise.
     base = replace(found.base, q=43.8, q_limit=73.7, clearest=clearest)
     unknown = verdict_sentence(replace(found, base=base), terms)
-    assert f"not by Q alone but in that {told}. " in unknown
+    assert f"not by Q alone but in that {words}. " in unknown
 
 
 def test_what_would_withdraw_a_name_is_the_fit_that_gave_it(discovered: Discovered, terms: Terms) -> None:
     found = discovered(Verdict.NAMED)
     assert found.chosen is not None
-    told = changes(replace(found, chosen=replace(found.chosen, p_value=0.31)), terms, Settings(fit_level=0.1))
+    likely = replace(found, chosen=replace(found.chosen, p_value=0.31))
+    words = changes(likely, terms, Settings(fit_level=0.1))
     wanted = f"makes, {percent(0.31)} disagree with it as much; were it less than {percent(0.1)},"
-    assert any(wanted in sentence for sentence in told)
+    assert any(wanted in sentence for sentence in words)
 
 
 def test_the_page_shows_every_mechanism_and_the_first_pairs(discovered: Discovered) -> None:
@@ -197,15 +198,15 @@ def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(
 ) -> None:
     found = discovered(Verdict.TIE)
     assert found.next_experiment is not None
-    told = " ".join(changes(found, terms, Settings()))
-    assert "8 more tests under the condition “wide” would settle it" in told
+    words = " ".join(changes(found, terms, Settings()))
+    assert "8 more tests under the condition “wide” would settle it" in words
     weak = replace(found, next_experiment=replace(found.next_experiment, wanted_q=25.9))
-    told = " ".join(changes(weak, terms, Settings()))
-    assert "would settle it (" not in told
-    assert "No condition of the study would settle it, not with 8 more tests either." in told
+    words = " ".join(changes(weak, terms, Settings()))
+    assert "would settle it (" not in words
+    assert "No condition of the study would settle it, not with 8 more tests either." in words
     # then what each of the two would do by itself
     for name in found.named:
-        assert terms.mechanisms[name].confirm in told
+        assert terms.mechanisms[name].confirm in words
 
 
 def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(
@@ -222,17 +223,17 @@ def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(
     assert next_step(noted, terms) == next_step(named, terms)
     heads = replace(tie, slips=(value,), without_slips=none)
     assert headline(heads, terms) == "A likely slip in the data"
-    told = verdict_sentence(heads, terms)
-    assert "With them: tie: contact adhesion and liquid bridges." in told
-    assert told.endswith(verdict_sentence(none, terms))
+    words = verdict_sentence(heads, terms)
+    assert "With them: tie: contact adhesion and liquid bridges." in words
+    assert words.endswith(verdict_sentence(none, terms))
     page = read_page(render_discovery(heads, whole_study, terms, Settings()))
     assert next_step(heads, terms).startswith("Look at the data first")
     assert next_step(heads, terms) in page.text
     # what is missed may be that value
     unknown = discovered(Verdict.UNKNOWN)
-    beside = replace(unknown, slips=(value,), without_slips=unknown, next_experiment=None)
-    assert headline(beside, terms) == headline(unknown, terms)
-    assert next_step(beside, terms).startswith("Look at the data first")
+    noted_unknown = replace(unknown, slips=(value,), without_slips=unknown, next_experiment=None)
+    assert headline(noted_unknown, terms) == headline(unknown, terms)
+    assert next_step(noted_unknown, terms).startswith("Look at the data first")
     # a unit makes the whole misfit, whatever verdict it gets
     unit = Slip(("r50", "fill_height"), none.data.conditions, None, 10.0, False, 27105.0, 28.0)
     gross = replace(unknown, slips=(unit,), without_slips=unknown)
@@ -243,8 +244,8 @@ def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(
 def test_a_heap_that_is_none_of_the_others_is_told_once(discovered: Discovered, terms: Terms) -> None:
     none = discovered(Verdict.NONE)
     heap = Slip(none.data.observables, ("wide",), 3, None, False, 254.0, 0.0)
-    [told] = slip_sentences(replace(none, slips=(heap,), without_slips=none))
-    assert told.startswith(
+    [words] = slip_sentences(replace(none, slips=(heap,), without_slips=none))
+    assert words.startswith(
         "A likely slip: heap 3 under wide is none of the others. On average its values lie 16"
     )
 
@@ -282,7 +283,7 @@ def test_an_unknown_that_is_off_alike_everywhere_names_the_observable_and_the_ne
     # a model that passes every rule, though another does, too, misses nothing
     passing = replace(found.candidates[0], admitted=True, objection="")
     assert misses(replace(found, candidates=(passing, *found.candidates[1:])), terms) == []
-    # something is off though no observable stands out: the one that is off most is told
+    # something is off though no observable stands out: the one that is off most is words
     assert len(misses(off_alike(found, 0.2), terms)) == 1
 
 
@@ -291,11 +292,11 @@ def test_the_summary_says_an_objection_once(
 ) -> None:
     found = discovered(Verdict.UNKNOWN)
     objection = found.candidates[0].objection
-    told = replace(found, reason=f"contact adhesion comes closest, but {objection}")
-    text = render_discovery(told, whole_study, terms, Settings())
+    words = replace(found, reason=f"contact adhesion comes closest, but {objection}")
+    text = render_discovery(words, whole_study, terms, Settings())
     summary = text[text.index('id="summary"') : text.index("What was simulated")]
     assert summary.count("comes closest, but") + summary.count("comes closest (") == 1
-    assert not any("Contact adhesion was refused" in one for one in changes(told, terms, Settings()))
+    assert not any("Contact adhesion was refused" in one for one in changes(words, terms, Settings()))
 
 
 def test_models_of_two_effects_have_their_titles_in_the_next_experiment(
@@ -304,11 +305,11 @@ def test_models_of_two_effects_have_their_titles_in_the_next_experiment(
     found = discovered(Verdict.NAMED)
     assert found.next_experiment is not None
     step = replace(found.next_experiment, separates=("plate_tilt + size_spread", "plate_tilt"))
-    told = next_step(replace(found, next_experiment=step), terms)
+    words = next_step(replace(found, next_experiment=step), terms)
     assert (
-        "the model with tilt of the plate and spread of sizes from the model with tilt of the plate" in told
+        "the model with tilt of the plate and spread of sizes from the model with tilt of the plate" in words
     )
-    assert told.startswith("Repeat the test")
+    assert words.startswith("Repeat the test")
     weak = next_step(replace(found, next_experiment=replace(step, expected_q=0.0)), terms)
     assert weak.startswith("No condition of the study would tell the model with tilt of the plate and spread")
     assert "Repeat the test" not in weak
@@ -323,11 +324,11 @@ def test_a_mean_that_stands_out_of_a_model_that_lacks_nothing_is_told(
     residuals, p = found.base.residuals.copy(), found.base.adjusted_p.copy()
     at = (found.data.conditions.index("wide"), found.data.observables.index("t55"))
     residuals[at], p[at] = 4.0, 1e-3
-    told = verdict_sentence(
+    words = verdict_sentence(
         replace(found, base=replace(found.base, residuals=residuals, adjusted_p=p)), terms
     )
-    assert "By itself t55 is" in told
-    assert "under wide (4 standard deviations)" in told
+    assert "By itself t55 is" in words
+    assert "under wide (4 standard deviations)" in words
 
 
 def test_notes_are_told_in_words(discovered: Discovered, whole_study: Study, terms: Terms) -> None:

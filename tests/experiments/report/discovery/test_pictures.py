@@ -19,7 +19,7 @@ from imaging import measure, save_picture, snapshot
 TRIAL = Path(__file__).parents[4] / "experiments" / "studies" / "trial" / "study.toml"
 
 ROWS, COLUMNS, TABLE = 600, 900, 456
-"""Of a photograph, and the row of its table's edge."""
+"""Size of a photograph, and the row of its table's edge."""
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_a_heap_is_cut_out_of_its_photograph(
     shown = photograph(path, "base", "flank")
     assert shown is not None
     assert "DSC_0412.jpg" in shown.caption
-    # Beside the heap there are a fifth of its width on either side: it takes 1 / 1.4 of the picture. Of the
+    # Next to the heap there are a fifth of its width on either side: it takes 1 / 1.4 of the picture. Of the
     # photograph it takes less than a third.
     heap = np.ptp(measure(image).outline.position)
     assert heap < COLUMNS / 3
@@ -65,9 +65,9 @@ def test_a_heap_is_cut_out_of_its_photograph(
     # The flanks are drawn on the heap: red crosses the middle columns, where the summit is.
     red = (np.abs(shown.image.astype(int) - [40, 40, 215]).max(axis=2) < 30).any(axis=0)
     assert red[len(red) // 3 : 2 * len(red) // 3].mean() > 0.9
-    told = float(shown.caption.partition("°")[0].rpartition(" ")[2])
+    read = float(shown.caption.partition("°")[0].rpartition(" ")[2])
     # The cone is laid out on a grid of 0.5 mm, and stands on spheres of 0.5 mm, 20 mm about its axis.
-    assert told == pytest.approx(np.degrees(np.arctan(0.5)), abs=1.0)
+    assert read == pytest.approx(np.degrees(np.arctan(0.5)), abs=1.0)
     monkeypatch.setattr(pictures, "WIDEST", 200)
     small = photograph(path, "base", "flank")
     assert small is not None

@@ -1,4 +1,4 @@
-"""Words of the page beside the verdict: instruments that a model leans on, factors that drift."""
+"""Words of the page next to the verdict: instruments that a model leans on, factors that drift."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def test_a_model_that_leans_on_an_allowance_says_so(
     part = {Verdict.NONE: "base", Verdict.NAMED: "chosen", Verdict.UNKNOWN: "closest"}[verdict]
     fit = leaning_on(found.base, t55=2.6, fill_height=1.9)
     sentence = verdict_sentence(replace(found, **{part: fit}), terms)
-    told = "The model leans on what was allowed for the calibration of t55 (2.6 standard deviations):"
-    assert f"{told} check that instrument." in sentence
+    words = "The model leans on what was allowed for the calibration of t55 (2.6 standard deviations):"
+    assert f"{words} check that instrument." in sentence
     assert "fill height (" not in sentence
 
 
@@ -39,8 +39,8 @@ def test_lengths_that_lean_on_one_scale_are_one_instrument(discovered: Discovere
     # off by 0.5 % of 0.2 % allowed, all lengths of the picture alike
     uses = [CalibrationUse(name, 0.0, 0.002, 0.0, 0.005, 2.5) for name in ("height", "r50", "r90")]
     sentence = verdict_sentence(replace(found, chosen=replace(found.chosen, calibration=tuple(uses))), terms)
-    told = "the calibration of the scale of the photograph (2.5 standard deviations): check that instrument."
-    assert sentence.endswith(told)
+    words = "the calibration of the scale of the photograph (2.5 standard deviations): check that instrument."
+    assert sentence.endswith(words)
 
 
 def test_a_model_within_its_allowances_says_nothing_of_them(discovered: Discovered, terms: Terms) -> None:
@@ -54,11 +54,11 @@ def test_factors_that_drift_are_no_contradiction_to_a_model_that_lacks_nothing(
 ) -> None:
     found = discovered(Verdict.NONE)
     first, second = found.drifts
-    told = "would differ between conditions"
+    words = "would differ between conditions"
     assert f"{terms.factors[first.factor].label} and" in verdict_sentence(found, terms)
-    assert told in verdict_sentence(found, terms)
+    assert words in verdict_sentence(found, terms)
     one = verdict_sentence(replace(found, drifts=(first, replace(second, p_value=0.01))), terms)
     assert terms.factors[second.factor].label not in one
-    assert told in one
+    assert words in one
     calm = tuple(replace(drift, p_value=0.01) for drift in found.drifts)
-    assert told not in verdict_sentence(replace(found, drifts=calm), terms)
+    assert words not in verdict_sentence(replace(found, drifts=calm), terms)

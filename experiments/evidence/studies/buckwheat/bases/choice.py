@@ -77,11 +77,10 @@ class Misfits:
         return (shifted**2 - self.variances[:, seen]).mean(axis=1)
 
     def shift(self, stages: Sequence[str]) -> FloatArray:
-        """Common shift [deg] that brings the mean over some tables to the published one: each candidate's."""
+        """Return each candidate's shift [deg] that brings the mean over some tables to the published one."""
         return -self.differences[:, self._within(stages)].mean(axis=1)
 
     def _within(self, stages: Sequence[str]) -> NDArray[np.bool_]:
-        """Runs of some tables."""
         return np.logical_or.reduce([self._runs_of[stage] for stage in stages])
 
     @cached_property
@@ -258,7 +257,7 @@ class BaseChoice:
 
 
 def written() -> Candidate:
-    """The study as written: the first option of every axis."""
+    """Return the study as written: the first option of every axis."""
     first = grid()
     return Candidate(Base(first.law[0], first.clump[0], first.plate[0]), first.estimator[0].name)
 

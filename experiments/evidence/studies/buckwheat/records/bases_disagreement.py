@@ -41,7 +41,7 @@ PAGE, RESULTS = "disagreement.md", "disagreement.json"
 _INTRODUCTION = """\
 # The paper's data, asked what the model lacks
 
-Made by `python -m experiments.evidence.studies.buckwheat.records.bases_disagreement` from the runs beside this page, with
+Made by `python -m experiments.evidence.studies.buckwheat.records.bases_disagreement` from the runs next to this page, with
 the analysis of `dem-warp discover` and its default rules (SHA-256 `{rules}`). Nothing was simulated for it.
 
 ## EDEM's angles as reality
@@ -80,7 +80,6 @@ def _verdict(found: Discovery) -> str:
 
 
 def _fits(found: Discovery) -> list[str]:
-    """The calibrated base, the chosen model beside it, and where they stand against every setting."""
     fits = {"study as written": found.base, "with the effect": found.chosen}
     rows = [{"model": name, **_fit_row(fit)} for name, fit in fits.items() if fit is not None]
     models: Layout = [

@@ -1,4 +1,4 @@
-"""The record of the paper's runs simulated again: a folder whose page is made from the tables beside it."""
+"""The record of the paper's runs simulated again: a folder whose page is made from its tables."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Record:
     provenance: Mapping[str, Any]
     """Origin of the numbers: commit, machine, date, wall times."""
     campaign: Mapping[str, Any] | None = None
-    """A campaign of our own beside it: outcome, reason, effects of its screening."""
+    """Campaign of our own: outcome, reason, effects of its screening."""
     card: bool = False
     """There is a card of the material that it chose."""
     scales: Mapping[str, Replay] = field(default_factory=dict)
@@ -87,7 +87,7 @@ def write_record(
 ) -> Path:
     """Write the tables of a record, and its page; return the page.
 
-    Its cases are the paper's runs simulated again; the campaign is our own, to be set beside. What stands in
+    Its cases are the paper's runs simulated again; the campaign is our own. What is in
     the folder of a picture, of other scales or of sensitivities is taken in.
     """
     write_text(folder / RUNS, cases.to_csv(index=False))
@@ -118,7 +118,7 @@ def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str],
 
 
 def write_record_page(folder: Path) -> Path:
-    """Write the page of a record, and its plot, anew from the tables beside it."""
+    """Write the page of a record, and its plot, again from its tables."""
     record = Record.read(folder)
     runs = record.replay.runs[lambda runs: runs["stage"].isin(DESIGNS) & runs["angle"].notna()]
     groups = [TABLES[stage] for stage in runs["stage"]]
@@ -149,8 +149,8 @@ def record_page(record: Record) -> str:
     tables = replay_tables(record.replay, campaign_effects(record.campaign))
     return markdown_page(
         "# The paper's runs, simulated again",
-        "Every run of Tables 3, 5 and 6 of the paper and its verification, beside the published angles. This "
-        "page is made from the files beside it: "
+        "Every run of Tables 3, 5 and 6 of the paper and its verification, with the published angles. This "
+        "page is made from the files next to it: "
         "`python -m experiments.evidence.studies.buckwheat.records.paper_record --help`.",
         facts_list(record.provenance),
         wall_times_table(record.provenance, "heaps"),

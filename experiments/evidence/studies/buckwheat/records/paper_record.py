@@ -50,7 +50,7 @@ def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
     for name in (CAMPAIGN, HEAPS):
         if (source / RECORD / name).is_file():
             copy_file(source / RECORD / name, record / name)
-    # The card of the campaign beside, with its clumps.
+    # the card of the campaign with its clumps
     for path in source.glob(f"{Path(CARD).stem}*"):
         copy_file(path, record / path.name)
     if commit:

@@ -90,9 +90,9 @@ def write_record_page(record: Path = FOLDER, study_file: Path = STUDY) -> Path:
     parts = [
         "# From a curve to a point",
         "One repose angle leaves a curve of frictions. Here the density of the filled tube and the flow out "
-        "of a hopper stand beside it, in a twin experiment: all three come from simulations with hidden "
+        "of a hopper are added to it, in a twin experiment: all three come from simulations with hidden "
         f"frictions. The study is [{study_file.name}](../{study_file.name}); this page is made from the "
-        "cases beside it by `python -m experiments.evidence.studies.buckwheat.records.point_record`.",
+        "cases next to it by `python -m experiments.evidence.studies.buckwheat.records.point_record`.",
     ]
     for folder in sorted(path.parent for path in record.glob(f"*/{CASES}")):
         study = load_study(study_file, folder.name)
@@ -109,7 +109,6 @@ def kept_campaign(study: Study, folder: Path) -> Campaign:
 
 
 def _findings(campaign: Campaign, study: Study, folder: Path) -> list[str]:
-    """Findings of a campaign; where it ended early, why."""
     outcome = f"Outcome: {campaign.outcome}. {campaign.reason}"
     if campaign.optimum is None or campaign.optimum.joint is None:
         return [prose(outcome)]
@@ -121,7 +120,7 @@ def _findings(campaign: Campaign, study: Study, folder: Path) -> list[str]:
         picture = [
             f"![Where each response agrees, and where all do]({folder.name}/joint.png)",
             "Each panel is a cut through the point of the smallest chi². The hidden truth may lie in the "
-            "compatible region and yet beside it in a cut.",
+            "compatible region and yet outside it in a cut.",
         ]
     tables = response_tables(campaign)
     return [

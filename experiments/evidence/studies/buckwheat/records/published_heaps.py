@@ -72,7 +72,7 @@ def published_heaps() -> Measured:
 
 
 def physical_heaps() -> Measured:
-    """The measured repose angle at `CENTRE`: five values of the published mean and standard deviation.
+    """Return the measured repose angle at `CENTRE`: five values of the published mean and standard deviation.
 
     The five themselves were not published. Any five with these two moments say the same of a mean.
     """
@@ -175,7 +175,7 @@ def _noise(base: Replay, stage: str, factors: int) -> Noise:
 
 
 def _signatures(settings: pd.DataFrame, found: Sensitivities) -> dict[str, pd.DataFrame]:
-    """By variant: its shift of every setting's angle [deg], and the variance of that over one heap's.
+    """For each variant: its shift of every setting's angle [deg], and the variance of that over one heap's.
 
     Where a run failed, the shift is the mean of the others, as uncertain as they differ.
     """
@@ -203,7 +203,6 @@ def _averaged(signature: pd.DataFrame) -> pd.Series:
 def _surfaces(
     fitted: np.ndarray, spread: np.ndarray, noise: Noise, additions: dict[str, Addition]
 ) -> Surfaces:
-    """The emulator of a condition of which the first terms were fitted, and there are no others."""
     terms = _base_terms(noise)
     coefficients, gram_inverse = np.zeros(terms), np.zeros((terms, terms))
     coefficients[: len(fitted)] = fitted
@@ -213,7 +212,6 @@ def _surfaces(
 
 
 def _addition(signature: pd.Series, noise: Noise) -> Addition:
-    """A mechanism that is linear in its size."""
     middle = np.zeros((1, len(noise.coefficients) - 1))
     variance, terms = noise.variance(middle[0]), added(middle, np.zeros(1)).shape[1]
     coefficients, gram_inverse = np.zeros(terms), np.zeros((terms, terms))
@@ -236,7 +234,6 @@ def _base_terms(noise: Noise) -> int:
 
 
 def _exact(coefficients: np.ndarray) -> Polynomial:
-    """A polynomial that nothing was fitted to, so that it misses nothing."""
     return Polynomial(coefficients[:, None], np.zeros(1), {})
 
 

@@ -1,1 +1,1 @@
-"""The paper's runs simulated again, and their analysis beside the published one."""
+"""The paper's runs simulated again, and their analysis next to the published one."""

@@ -229,7 +229,7 @@ class Replay:
 
 
 def published_noise() -> tuple[float, float]:
-    """Standard deviations of the paper's own replicates [deg]: composite centre (5), verification (3)."""
+    """Return the deviations of the paper's replicates [deg]: composite centre (5), verification (3)."""
     centre = paper.surface().pure_error.mean_sq ** 0.5
     return float(centre), Sample.of(paper.verification()).sd
 
@@ -239,12 +239,10 @@ def _labels(cases: pd.DataFrame) -> pd.MultiIndex:
 
 
 def _course(cases: pd.DataFrame) -> pd.DataFrame:
-    """The observables of `COURSE` in their units, by run."""
     factors = {name: factor for name, (_, factor) in COURSE.items()}
     return cases.set_index("run")[list(factors)] * pd.Series(factors)
 
 
 def _settings(runs: pd.DataFrame) -> np.ndarray:
-    """Number of every run's setting within its stage."""
     names = [factor.name for factor in paper.factors()]
     return runs.groupby(["stage", *names], dropna=False, sort=False).ngroup().to_numpy()

@@ -1,4 +1,4 @@
-"""Tables and chart of the paper's runs simulated again, beside the published angles and their analysis."""
+"""Tables and chart of the paper's runs simulated again, next to the published angles and their analysis."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NO_BREAK = "\u00a0"
 def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[str, Table]:
     """Lay out everything that the paper's runs have to say, by name.
 
-    Effects of a campaign of our own by factor (effect, p, rank) are set beside those at the paper's runs.
+    Effects of a campaign of our own by factor (effect, p, rank) are compared with those at the paper's runs.
     """
     tables = {"agreement": agreement_table(replay)}
     if "screening" in replay.analysed:
@@ -72,7 +72,7 @@ def agreement_table(replay: Replay) -> Table:
 
 
 def runs_table(replay: Replay) -> Table:
-    """Lay out every run beside its published angle."""
+    """Lay out every run with its published angle."""
     frame = replay.runs.assign(table=replay.runs["stage"].map(TABLES))
     shown: Layout = [
         Column("table", "stage"),

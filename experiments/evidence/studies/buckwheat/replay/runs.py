@@ -45,7 +45,7 @@ def published_runs() -> pd.DataFrame:
 
 
 def planned_cases(replicates: int, stages: Iterable[str] = tuple(STAGES)) -> pd.DataFrame:
-    """Lay out the cases of some stages: every run so many times, each case with its own seed.
+    """Lay out the cases of some stages: every run some times, each case with its own seed.
 
     A row a case: stage, run, replicate, every factor in its natural unit, published (angle [deg]), seed.
 

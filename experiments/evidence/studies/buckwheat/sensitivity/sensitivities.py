@@ -108,6 +108,5 @@ class Sensitivities:
 
 
 def _is_usable(replay: Replay) -> bool:
-    """True if every table has runs to compare, and the screening its effects."""
     runs = replay.runs.dropna(subset=["angle"])["stage"].value_counts()
     return "screening" in replay.analysed and all(runs.get(stage, 0) >= LEAST_RUNS for stage in DESIGNS)
