@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from experiments.calibrate.results import Campaign
 from experiments.measurement.filling import filling_missed, filling_reached, filling_text
 from experiments.report.kit.numbers import capital, enumeration, fixed
-from experiments.report.kit.texts import say
+from experiments.report.kit.sentences import say
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 

@@ -9,7 +9,14 @@ from doe import JointFit
 from doe.plots.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, SKY
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
 from experiments.report.kit.chart import Chart, add_bars, new_figure
-from experiments.report.surfaces import REGION_FILL, Slice, add_design, add_level, add_region, add_settings
+from experiments.report.surface_charts import (
+    REGION_FILL,
+    Slice,
+    add_design,
+    add_level,
+    add_region,
+    add_settings,
+)
 from experiments.studyfile.campaign import Response
 
 COLORS = (BLUE, ORANGE, PURPLE, SKY, MUTED)

@@ -14,8 +14,8 @@ from experiments.io.program_version import program_version
 from experiments.report.kit.latex import latex_table, latex_text
 from experiments.report.kit.markdown import markdown_table
 from experiments.report.kit.numbers import enumeration, fixed, p_clause, quantity, significant
+from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Layout, Table, columns, make_table
-from experiments.report.kit.texts import say
 from experiments.report.study_facts import study_facts
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response

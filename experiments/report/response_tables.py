@@ -12,8 +12,8 @@ from doe import JointFit
 from experiments.calibrate.joint import direction_text, open_directions
 from experiments.calibrate.results import Campaign, ScreeningResult, SurfaceResult
 from experiments.report.kit.numbers import term, unit_sign
+from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
-from experiments.report.kit.texts import say
 from experiments.studyfile.campaign import TARGET_SCENE, OptimumSettings, Response
 
 

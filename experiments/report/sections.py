@@ -17,7 +17,7 @@ from experiments.calibrate.results import (
     TargetResult,
     VerificationResult,
 )
-from experiments.report import charts, stage_tables, surfaces
+from experiments.report import stage_charts, stage_tables, surface_charts
 from experiments.report.joint_charts import joint_charts
 from experiments.report.kit.chart import Chart
 from experiments.report.kit.html import Chapter
@@ -106,7 +106,7 @@ def _target(context: Context, result: TargetResult) -> Chapter:
 def _noise_floor(context: Context, result: NoiseFloorResult) -> Chapter:
     caption, responses = "Replicates at the middle.", context.campaign.responses
     table = stage_tables.cases_table("noise-floor", result.cases, responses, caption)
-    chart = charts.noise_floor_chart(result, context.target, context.leading)
+    chart = stage_charts.noise_floor_chart(result, context.target, context.leading)
     return chapter("noise_floor", {"cases": table}, [chart])
 
 
@@ -118,7 +118,7 @@ def _screening(context: Context, result: ScreeningResult) -> Chapter:
         "effects": stage_tables.effects_table(screen, response, context.labels, alpha),
         "anova": stage_tables.anova_table("screening-anova", screen.anova, "Analysis of variance."),
     }
-    drawn = (charts.pareto_chart, charts.half_normal_chart)
+    drawn = (stage_charts.pareto_chart, stage_charts.half_normal_chart)
     return chapter("screening", tables, [draw(screen, alpha, response) for draw in drawn])
 
 
@@ -128,7 +128,7 @@ def _selection(context: Context, result: SelectionResult) -> Chapter:
 
 def _climb(context: Context, result: ClimbResult) -> Chapter:
     tables = {"path": stage_tables.climb_table(result, context.leading)}
-    return chapter("climb", tables, [charts.climb_chart(result, context.target, context.leading)])
+    return chapter("climb", tables, [stage_charts.climb_chart(result, context.target, context.leading)])
 
 
 def _surface(context: Context, result: SurfaceResult) -> Chapter:
@@ -144,8 +144,8 @@ def _surface(context: Context, result: SurfaceResult) -> Chapter:
     outside = stage_tables.outside_table(result)
     if outside:
         tables["outside"] = outside
-    drawn = surfaces.surface_charts(result, campaign.optimum, context.target, response)
-    return chapter("surface", tables, [*drawn, *surfaces.residual_charts(fit.reduced, response)])
+    drawn = surface_charts.surface_charts(result, campaign.optimum, context.target, response)
+    return chapter("surface", tables, [*drawn, *surface_charts.residual_charts(fit.reduced, response)])
 
 
 def _optimum(context: Context, result: OptimumResult) -> Chapter:
@@ -166,7 +166,7 @@ def _verification(context: Context, result: VerificationResult) -> Chapter:
     table = stage_tables.cases_table("verification-cases", result.cases, responses, caption)
     units = {response.name: response.unit for response in responses}
     tests = stage_tables.differences_table({name: result.responses[name] for name in units}, units)
-    chart = charts.verification_chart(result, context.leading)
+    chart = stage_charts.verification_chart(result, context.leading)
     return chapter("verification", {"cases": table, "tests": tests}, [chart])
 
 

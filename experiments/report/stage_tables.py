@@ -19,8 +19,8 @@ from experiments.calibrate.results import (
     failed,
 )
 from experiments.report.kit.numbers import unit_sign
+from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
-from experiments.report.kit.texts import say
 from experiments.studyfile.campaign import TARGET_SCENE, Response
 
 SIGNIFICANT = 0.05

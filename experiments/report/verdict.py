@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from experiments.calibrate.results import Campaign, Outcome
 from experiments.report.kit.numbers import enumeration
-from experiments.report.kit.texts import say
+from experiments.report.kit.sentences import say
 
 HEADLINES = {
     Outcome.CALIBRATED: "Calibrated",

@@ -27,7 +27,7 @@ from experiments.journal.journal import Journal
 from experiments.measurement.measured_file import read_measured
 from experiments.report import HeapPicture, SolidHeap
 from experiments.report.discovery import Terms, write_discovery
-from experiments.report.discovery.pictures import photograph, simulated_heaps, turned
+from experiments.report.discovery.compared_heaps import photograph, simulated_heaps, turned
 from experiments.report.study_companion import Companion, companion_of
 from experiments.runs.campaign import Watch, watching
 from experiments.runs.lasting import BANK, OUTCOMES, lasting_files

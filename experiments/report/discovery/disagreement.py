@@ -10,7 +10,7 @@ import numpy as np
 from doe.discrepancy import CalibrationUse, Discovery, Fit, Question, Slip, Verdict
 from experiments.report.discovery.terms import Terms, spaced
 from experiments.report.kit.numbers import enumeration, trimmed
-from experiments.report.kit.texts import say
+from experiments.report.kit.sentences import say
 from experiments.studyfile.observables import Instrument
 
 CLEAR = 0.05

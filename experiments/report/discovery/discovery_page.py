@@ -8,11 +8,9 @@ from typing import Any
 
 from doe.discrepancy import Discovery, Settings, Verdict
 from experiments.report.cautions import Caution, study_cautions
-from experiments.report.discovery import charts, tables
+from experiments.report.discovery import discovery_charts, discovery_tables
 from experiments.report.discovery.disagreement import conventions, misses, slip_decides
-from experiments.report.discovery.paper_text import search_pastes
-from experiments.report.discovery.terms import Terms, percent
-from experiments.report.discovery.verdict import (
+from experiments.report.discovery.discovery_verdict import (
     SETTLED,
     changes,
     headline,
@@ -20,6 +18,8 @@ from experiments.report.discovery.verdict import (
     reason_sentence,
     verdict_sentence,
 )
+from experiments.report.discovery.search_text import search_pastes
+from experiments.report.discovery.terms import Terms, percent
 from experiments.report.kit.chart import Chart
 from experiments.report.kit.html import Chapter, flat, render_page
 from experiments.report.kit.numbers import trimmed
@@ -158,16 +158,18 @@ def _cards(found: Discovery, terms: Terms) -> list[Card]:
 
 
 def _chapters(found: Discovery, terms: Terms) -> list[Chapter]:
-    compared = charts.comparison_charts(found, terms)
+    compared = discovery_charts.comparison_charts(found, terms)
     built = {
         "gap": _gap(found, terms),
         "candidates": _candidates(found, terms),
         "before_after": _before_after(found),
         "compared": _chapter("compared", charts={"compared": compared}) if found.base else None,
         "heaps": _chapter("heaps"),
-        "power": _chapter("power", {"power": tables.power_table(found, terms)}) if found.power else None,
+        "power": _chapter("power", {"power": discovery_tables.power_table(found, terms)})
+        if found.power
+        else None,
         "changes": _chapter("changes"),
-        "data": _chapter("data", {"data": tables.data_table(found, terms)}),
+        "data": _chapter("data", {"data": discovery_tables.data_table(found, terms)}),
         "paper_text": Chapter("paper_text", TITLES["paper_text"], template="sections/paper_text.html.j2")
         if found.base
         else None,
@@ -179,12 +181,12 @@ def _chapters(found: Discovery, terms: Terms) -> list[Chapter]:
 def _gap(found: Discovery, terms: Terms) -> Chapter | None:
     if found.base is None:
         return None
-    shown = {"parameters": tables.parameters_table(found, terms)}
-    if (calibration := tables.calibration_table(found, terms)) is not None:
+    shown = {"parameters": discovery_tables.parameters_table(found, terms)}
+    if (calibration := discovery_tables.calibration_table(found, terms)) is not None:
         shown["calibration"] = calibration
     if found.drifts:
-        shown["drifts"] = tables.drifts_table(found, terms)
-    return _chapter("gap", shown, {"maps": charts.residual_maps(found, terms)})
+        shown["drifts"] = discovery_tables.drifts_table(found, terms)
+    return _chapter("gap", shown, {"maps": discovery_charts.residual_maps(found, terms)})
 
 
 def _candidates(found: Discovery, terms: Terms) -> Chapter | None:
@@ -192,14 +194,14 @@ def _candidates(found: Discovery, terms: Terms) -> Chapter | None:
         return None
     drawn = {}
     if found.base and found.base.excess:
-        drawn["explained"] = [charts.explained_chart(found, terms)]
+        drawn["explained"] = [discovery_charts.explained_chart(found, terms)]
     if found.confounding:
-        drawn["confounding"] = [charts.confounding_chart(found.confounding, terms)]
-    return _chapter("candidates", {"candidates": tables.candidates_table(found, terms)}, drawn)
+        drawn["confounding"] = [discovery_charts.confounding_chart(found.confounding, terms)]
+    return _chapter("candidates", {"candidates": discovery_tables.candidates_table(found, terms)}, drawn)
 
 
 def _before_after(found: Discovery) -> Chapter | None:
     if not found.before_after:
         return None
-    gaps = {"gaps": tables.before_after_table(found)}
-    return _chapter("before_after", gaps, {"gaps": [charts.gap_chart(found)]})
+    gaps = {"gaps": discovery_tables.before_after_table(found)}
+    return _chapter("before_after", gaps, {"gaps": [discovery_charts.gap_chart(found)]})

@@ -15,8 +15,8 @@ from experiments.io.files import write_text
 from experiments.io.toml_files import toml_text
 from experiments.measurement.measured_target import Replicated, target_sections
 from experiments.report.clump_files import gather_clumps
+from experiments.report.discovery.discovery_verdict import tied
 from experiments.report.discovery.terms import Terms
-from experiments.report.discovery.verdict import tied
 from experiments.studyfile import Study
 from experiments.studyfile.manifest import study_hash
 from experiments.studyfile.mechanism_factor import MechanismFactor, with_mechanisms

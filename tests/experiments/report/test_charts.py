@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from experiments.calibrate import Campaign
-from experiments.report.charts import half_normal_chart, pareto_chart
-from experiments.report.surfaces import surface_charts
+from experiments.report.stage_charts import half_normal_chart, pareto_chart
+from experiments.report.surface_charts import surface_charts
 
 
 def test_the_pareto_chart_holds_every_effect_and_the_critical_values(campaign: Campaign) -> None:

@@ -11,8 +11,8 @@ import pandas as pd
 from doe.discrepancy import BeforeAfter, Candidate, Discovery, Drift, Fit, Interval, Power
 from experiments.report.discovery.terms import GAP, Terms, condition_name, percent, spaced
 from experiments.report.kit.numbers import MISSING, estimate, trimmed
+from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
-from experiments.report.kit.texts import say
 
 T = TypeVar("T")
 Entries = dict[Column, Callable[[T], object]]

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from doe.discrepancy import Discovery
-from experiments.report.discovery.tables import parameters_table
+from experiments.report.discovery.discovery_tables import parameters_table
+from experiments.report.discovery.discovery_verdict import verdict_line
 from experiments.report.discovery.terms import Terms
-from experiments.report.discovery.verdict import verdict_line
 from experiments.report.kit.numbers import prose
-from experiments.report.kit.texts import say
+from experiments.report.kit.sentences import say
 from experiments.report.paper_text import Paste, pastes_of, simulated_sentences, software
 from experiments.studyfile import Study
 

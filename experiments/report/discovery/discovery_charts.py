@@ -7,11 +7,11 @@ import plotly.graph_objects as go
 
 from doe.discrepancy import Confounding, Discovery, Fit
 from doe.plots.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
-from experiments.report.discovery.tables import shown_candidates
+from experiments.report.discovery.discovery_tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
 from experiments.report.kit.chart import Chart, add_bars, add_points, new_figure
 from experiments.report.kit.numbers import MISSING, capital, fixed
-from experiments.report.kit.texts import say
+from experiments.report.kit.sentences import say
 from experiments.report.kit.theme import DIVERGING
 
 MAP_REACH = 6.0

@@ -14,10 +14,10 @@ from doe.discrepancy import Answer, Discovery, Interval, Question, Settings, Sli
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
 from experiments.report.discovery.disagreement import conventions, misses, slip_sentences
-from experiments.report.discovery.paper_text import search_pastes
-from experiments.report.discovery.tables import SHOWN_PAIRS, data_table, shown_candidates
+from experiments.report.discovery.discovery_tables import SHOWN_PAIRS, data_table, shown_candidates
+from experiments.report.discovery.discovery_verdict import changes, headline, next_step
+from experiments.report.discovery.search_text import search_pastes
 from experiments.report.discovery.terms import percent
-from experiments.report.discovery.verdict import changes, headline, next_step
 from experiments.studyfile import Study
 
 Discovered = Callable[[Verdict], Discovery]

@@ -10,10 +10,10 @@ from typing import Any
 from doe.discrepancy import Discovery, Settings
 from experiments.io.plain_data import jsonable
 from experiments.report.discovery.discovery_page import render_discovery
+from experiments.report.discovery.discovery_tables import frames
+from experiments.report.discovery.discovery_verdict import headline, verdict_sentence
 from experiments.report.discovery.study_file import write_study_files
-from experiments.report.discovery.tables import frames
 from experiments.report.discovery.terms import Terms
-from experiments.report.discovery.verdict import headline, verdict_sentence
 from experiments.report.kit.html import Chapter
 from experiments.report.pictures import HeapPicture
 from experiments.report.solid import SolidHeap

@@ -30,7 +30,7 @@ from experiments.report.discovery.disagreement import (
 )
 from experiments.report.discovery.terms import Terms, percent, spaced
 from experiments.report.kit.numbers import capital, enumeration, fixed, p_clause, trimmed
-from experiments.report.kit.texts import say
+from experiments.report.kit.sentences import say
 
 SETTLED = (Verdict.NONE, Verdict.NAMED)
 """Verdicts that leave no question open."""

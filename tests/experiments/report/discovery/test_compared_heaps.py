@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from dem_warp import CaseResult
-from experiments.report.discovery import pictures
-from experiments.report.discovery.pictures import photograph, simulated_heaps, turned
+from experiments.report.discovery import compared_heaps
+from experiments.report.discovery.compared_heaps import photograph, simulated_heaps, turned
 from experiments.studyfile import Study, load_study
 from imaging import measure, save_picture, snapshot
 
@@ -68,7 +68,7 @@ def test_a_heap_is_cut_out_of_its_photograph(
     read = float(shown.caption.partition("°")[0].rpartition(" ")[2])
     # The cone is laid out on a grid of 0.5 mm, and stands on spheres of 0.5 mm, 20 mm about its axis.
     assert read == pytest.approx(np.degrees(np.arctan(0.5)), abs=1.0)
-    monkeypatch.setattr(pictures, "WIDEST", 200)
+    monkeypatch.setattr(compared_heaps, "WIDEST", 200)
     small = photograph(path, "base", "flank")
     assert small is not None
     assert small.image.shape[1] == 200
