@@ -14,9 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PLUGIN = ROOT / "tests" / "plugin" / "grain_magnets"
 PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
-EVIDENCE = shutil.ignore_patterns(
-    "__pycache__", "benchmarks", "point", "record", "trials", "verification", "*.npz"
-)
+EVIDENCE = shutil.ignore_patterns("__pycache__", "evidence", "*.npz")
 
 EXPORTER = """
 from experiments.export.exporter import Exporter

@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-RECORD = ROOT / "experiments" / "studies" / "buckwheat" / "record" / "provenance.json"
+RECORD = ROOT / "experiments/evidence/studies/buckwheat/record/provenance.json"
 
 
 def pins(name: str) -> dict[str, str]:

@@ -15,12 +15,11 @@ import zipfile
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from itertools import combinations
 from pathlib import Path
-
-from setuptools import find_packages
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
@@ -180,11 +179,17 @@ def shared_base_names() -> list[str]:
 def installed() -> list[str]:
     """Tracked files that pip installs, by the rules of pyproject.toml."""
     rules = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
-    packages = find_packages(str(ROOT), **rules["packages"]["find"])
-    folders = {package.replace(".", "/") for package in packages}
+    chosen, left_out = (rules["packages"]["find"][key] for key in ("include", "exclude"))
     kinds = ["*.py", *rules["package-data"]["*"]]
-    inside = (name for name in tracked() if name.rpartition("/")[0] in folders)
-    return [name for name in inside if any(Path(name).match(kind) for kind in kinds)]
+
+    def is_chosen(name: str) -> bool:
+        package = name.rpartition("/")[0].replace("/", ".")
+        matches = [
+            any(fnmatchcase(package, pattern) for pattern in patterns) for patterns in (chosen, left_out)
+        ]
+        return matches == [True, False] and any(Path(name).match(kind) for kind in kinds)
+
+    return [name for name in tracked() if is_chosen(name)]
 
 
 def wheel_megabytes() -> float:
