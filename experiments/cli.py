@@ -42,7 +42,7 @@ from experiments.commands.options import (
     StudyFile,
     Workers,
 )
-from experiments.commands.plans import show_calibration, show_search
+from experiments.commands.plans import show_plan
 from experiments.commands.results import print_study, show_stage
 from experiments.commands.ui import UI_EXAMPLE, ui
 from experiments.commands.watch import WATCH_EXAMPLE, watch
@@ -118,8 +118,10 @@ def calibrate(
         folder = out or default_folder(chosen)
         published = paper_replicates if follow_paper or only_paper else 0
         if dry_run:
-            resources = resources_for(chosen, resources)
-            show_calibration(chosen, resources, published, not only_paper, as_json)
+            from experiments.runs.plan import plan_calibration
+
+            plan = plan_calibration(chosen, resources_for(chosen, resources), published, not only_paper)
+            show_plan(plan, as_json)
     go_on = Attempt.of(
         "calibrate", study, out=folder, scale=chosen.scale, **asked, engine=engine,
         follow_paper=follow_paper, only_paper=only_paper, live=live,
@@ -194,10 +196,11 @@ def discover(
         chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen, "discover")
         if dry_run:
+            from experiments.runs.plan import plan_search
             from experiments.runs.search import Job
 
             job = Job(chosen, measured, folder, bank, photographs_only, seed=seed)
-            show_search(job, resources_for(chosen, resources), as_json)
+            show_plan(plan_search(job, resources_for(chosen, resources)), as_json)
     go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
         **asked, seed=seed, engine=engine, live=live, json=as_json,

@@ -22,7 +22,7 @@ def doctor(
     scheduler: Scheduler = None,
     cluster: Cluster = None,
     measure: Annotated[
-        bool, typer.Option("--measure", help="Measure the speed anew, for --dry-run and times left.")
+        bool, typer.Option("--measure", help="Simulate one batch of the paper's study and note its speed.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -32,13 +32,12 @@ def doctor(
     """
     with clear_errors():
         from experiments.runs.choices import chosen_resources
-        from experiments.runs.examination import examine
-        from experiments.runs.plan import measure_and_store
+        from experiments.runs.examination import examine, measure_speed
 
         resources = chosen_resources(device, workers, scheduler, cluster)
         if measure:
-            messages.print(f"Measuring the speed of {resources}.")
-            measure_and_store(resources)
+            messages.print(f"Simulating one batch of the paper's study on {resources}.")
+            measure_speed(resources)
         findings = examine(resources)
     if as_json:
         typer.echo(json.dumps([finding.to_dict() for finding in findings], allow_nan=False))

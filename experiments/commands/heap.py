@@ -23,7 +23,7 @@ from experiments.commands.options import (
     StudyFile,
     assignments,
 )
-from experiments.commands.plans import show_heap
+from experiments.commands.plans import show_plan
 from experiments.commands.results import print_measured, print_narrowness
 from experiments.live.server import live_page
 
@@ -95,7 +95,9 @@ def heap(
         resources = resources_for(chosen, resources)
         case = chosen.case(values, seed, place)  # what it refuses is refused before anything is written
         if dry_run:
-            show_heap(chosen, resources, case, as_json)
+            from experiments.runs.plan import plan_heap
+
+            show_plan(plan_heap(chosen, resources, case), as_json)
     go_on = Attempt.of(
         "heap", study, out=folder, set=settings, seed=seed, scene=scene, frames=frames, movie=movie,
         scale=chosen.scale, device=device, scheduler=scheduler, cluster=cluster, engine=engine, live=live,

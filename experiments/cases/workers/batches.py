@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dem_warp import Case
+from dem_warp.device import resolve_device
+from dem_warp.laws.contact_law import memory_size
+from dem_warp.room import neighbour_room
 from dem_warp.simulation import batches
-from experiments.cases.forecast.cost import cost_of, device_bytes
+from experiments.cases.forecast.work import work_of
+
+if TYPE_CHECKING:
+    from experiments.cases.workers.resources import Resources
 
 WORLDS = 1024
 """Worlds that one launch on a GPU holds at the most: few enough that a killed run loses little."""
@@ -21,6 +28,12 @@ GPU_WORKERS = 2
 """Workers of a GPU, each with a launch of its own in a process of its own, where workers are processes that
 are started here: while the host makes the worlds of one launch, looks at them or sends their results, another
 has the GPU. One GPU without a cluster has one, this process."""
+
+PROCESS_BYTES = 450e6
+"""Memory of a process that simulates or measures [bytes]."""
+
+IDLE_SPHERES = 100.0
+"""Spheres that cost as much as a step without any."""
 
 MEMORY_SHARE = 0.8
 """Part of a device's free memory that the worlds of a launch may take, by what is predicted of them."""
@@ -57,7 +70,7 @@ def plan_batches(
     dealt = []
     for group in batches(cases, one_each=False):
         members = np.array(group)[_falling(costs[group])]
-        sizes = [cost_of(cases[i]) for i in group]
+        sizes = [work_of(cases[i]) for i in group]
         grains = len(group) * max(size.grains for size in sizes)
         largest = cases[group[int(np.argmax([size.spheres for size in sizes]))]]
         rounds = rounds_of(len(group), grains, workers, _worlds_held(largest, memory), sharing)
@@ -89,3 +102,44 @@ def _dealt(members: np.ndarray, rounds: int, workers: int) -> list[list[int]]:
     """Deal members out in rounds of a batch a worker; in each round all batches cost much the same."""
     parts = np.array_split(members, rounds)
     return [part[w::workers].tolist() for part in parts for w in range(min(workers, len(part)))]
+
+
+def device_bytes(case: Case[Any]) -> int:
+    """Bytes that the world of a case takes on a GPU, with its copy for stepping back; a CPU needs less.
+
+    They follow from the longest neighbour lists that it may have. Compiled kernels and graphs come on top.
+    """
+    [setup] = case.scene.prepare([case], resolve_device(None))
+    found, listed = neighbour_room(setup)
+    real = 8 if case.numerics.precision == "double" else 4
+    grains, spheres = setup.grains.count, setup.grains.count * case.grains.sphere_count
+    remembered = memory_size(setup.mechanisms, setup.forms)
+    lists = grains * listed * (4 + 4 * real + remembered * real)
+    state = 2 * (24 + 32 + 12 * real) + 60 + 4 * real
+    moving = grains * state + spheres * 8 * real + lists
+    buckets = 8 * 4 * spheres
+    return int(2 * moving + lists + grains * listed * 8 + spheres * (4 * found + 16 + 4 * real) + buckets)
+
+
+def relative_work(cases: Sequence[Case[Any]]) -> np.ndarray:
+    """Return the predicted work of cases, in steps of a sphere, (n,); 1 where it cannot be predicted."""
+    found = []
+    for case in cases:
+        try:
+            work = work_of(case)
+            found.append(work.steps * (IDLE_SPHERES + work.spheres))
+        except (ValueError, TypeError, AttributeError):
+            found.append(1.0)
+    return np.array(found, dtype=np.float64)
+
+
+def batch_memory(cases: Sequence[Case[Any]], most: int, workers: Resources) -> float:
+    """Predict the memory of this machine, or of each GPU, that at most so many such cases take [bytes]."""
+    if not cases:
+        return 0.0
+    largest = max(cases, key=lambda case: work_of(case).spheres)
+    each = device_bytes(largest)
+    if not workers.on_gpu:
+        return (each + PROCESS_BYTES) * min(workers.count, most) + PROCESS_BYTES
+    rounds = rounds_of(most, most * work_of(largest).grains, workers.count, sharing=workers.sharing)
+    return each * workers.sharing * -(-most // (workers.count * rounds))

@@ -93,7 +93,7 @@ def simulate_batch(order: Order) -> None:
         wanted = line.ask()
         folder = order.checkpoint
         with line.outbox:
-            OwnWorkers(own_device(), 1).simulate(
+            OwnWorkers(own_device(), 1, notes_speed=False).simulate(
                 [order.cases[index] for index in wanted],
                 order.engine,
                 lambda number, result: line.send(index=wanted[number], result=result),

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from dem_warp import Case, CaseResult
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines.engine import Engine
+from experiments.cases.forecast.speed import expected_seconds, note_batch
 from experiments.cases.workers.batches import plan_batches
 from experiments.cases.workers.dask_task import (
     Message,
@@ -24,7 +25,6 @@ from experiments.cases.workers.dask_task import (
     fingerprint_of,
     simulate_batch,
 )
-from experiments.cases.workers.speed import expected_seconds
 from experiments.cases.workers.submissions import Submissions
 from experiments.cases.workers.wave import Wave
 from experiments.cases.workers.workers import WorkersLostError
@@ -131,7 +131,7 @@ class DaskWorkers:
         if not cases:
             return []
         self._await_workers()
-        wave = Wave(cases, on_result, on_progress, expected_seconds(cases, self, engine))
+        wave = Wave(cases, on_result, on_progress, None if engine else expected_seconds(cases, self))
         shares = self._shares() if engine is None else None
         batches = plan_batches(cases, wave.costs, self.count, *(shares or ()))
         if checkpoint is not None:
@@ -142,6 +142,8 @@ class DaskWorkers:
             session.run(batches, AHEAD * self.count)
         finally:
             session.close()
+        if engine is None:
+            note_batch(cases, self, *wave.pace)
         return wave.in_order()
 
     def _there(self) -> dict[str, Any]:

@@ -17,9 +17,10 @@ from dem_warp.checkpoint import CHECKPOINT_EVERY
 from dem_warp.device import resolve_device
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines.engine import Engine
+from experiments.cases.forecast.speed import expected_seconds, note_batch
 from experiments.cases.workers.batches import plan_batches
 from experiments.cases.workers.division import run_divided
-from experiments.cases.workers.speed import cpu_name, expected_seconds
+from experiments.cases.workers.resources import cpu_name
 from experiments.cases.workers.wave import Wave
 from experiments.cases.workers.workers import Workers
 
@@ -40,6 +41,8 @@ class OwnWorkers:
     """Onlooker of the batches of dem-warp's own engine."""
     processes: Processes | None = None
     """Processes that stay from wave to wave; None: a wave starts its own."""
+    notes_speed: bool = True
+    """Note the speed of finished batches: not those of a worker that shares its machine with others."""
 
     @cached_property
     def name(self) -> str:
@@ -93,7 +96,7 @@ class OwnWorkers:
 
         On a CPU all are one batch, whose processes take the costly cases first.
         """
-        wave = Wave(cases, on_result, on_progress, expected_seconds(cases, self, engine))
+        wave = Wave(cases, on_result, on_progress, None if engine else expected_seconds(cases, self))
 
         def run(batch: int, members: list[int]) -> None:
             every = checkpoint_interval(len(members) if self.on_gpu else 1)
@@ -111,6 +114,8 @@ class OwnWorkers:
         for number, batch in enumerate(self._batches(cases, wave, engine)):
             run_divided(wave, batch, partial(run, number))
             wave.end(number)
+        if engine is None and self.notes_speed:
+            note_batch(cases, self, *wave.pace)
         return wave.in_order()
 
     def _batches(self, cases: Sequence[Case], wave: Wave, engine: Engine | None) -> list[list[int]]:

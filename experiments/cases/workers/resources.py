@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import re
 from dataclasses import dataclass
 
@@ -10,7 +11,6 @@ import warp as wp
 
 from dem_warp.device import resolve_device
 from experiments.cases.workers.batches import GPU_WORKERS
-from experiments.cases.workers.speed import cpu_name
 from experiments.io.errors import InputError
 from experiments.studyfile.cluster_section import ClusterSection
 
@@ -144,6 +144,11 @@ class Resources:
             return f"{number} of {self.cluster.kind}"
         each = f", {self.sharing} workers each" if self.sharing > 1 else ""
         return ",".join(self.gpus) + each or (f"cpu, {number}" if self.cluster else "cpu")
+
+
+def cpu_name(workers: int) -> str:
+    """Return the name of this machine's CPU with a number of workers."""
+    return f"{platform.node()}, CPU, {workers} {'worker' if workers == 1 else 'workers'}"
 
 
 def _is_address(text: str) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
 from dem_warp.result import OnProgress, OnResult
-from experiments.cases.forecast.cost import relative_costs
+from experiments.cases.workers.batches import relative_work
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Wave:
         on_progress: OnProgress | None,
         expected: float | None = None,
     ) -> None:
-        self.costs = relative_costs(cases)
+        self.costs = relative_work(cases)
         """Predicted work of each case, (n,)."""
         self.results: dict[int, CaseResult] = {}
         self.fault: BaseException | None = None
@@ -51,11 +51,27 @@ class Wave:
         self._started = time.perf_counter()
         self._fractions = np.zeros(len(cases))
         self._phases: dict[int, Mapping[str, int]] = {}
+        self._begun: tuple[float, float] | None = None
 
     @property
     def is_complete(self) -> bool:
         """Tell that every case has given its result."""
         return len(self.results) == len(self.costs)
+
+    @property
+    def pace(self) -> tuple[float, float]:
+        """Part of the work that was done since the first progress, and the time it took [s].
+
+        The part is 0 where more than one case of ten failed: such cases end early.
+        """
+        part, begun = self._begun or (1.0, time.perf_counter())
+        failed = sum(result.status != "finished" for result in self.results.values())
+        done = self._fraction - part if 10 * failed <= len(self.results) else 0.0
+        return done, time.perf_counter() - begun
+
+    @property
+    def _fraction(self) -> float:
+        return 1.0 if self.is_complete else float(self.costs @ self._fractions / self.costs.sum())
 
     def left(self, members: Sequence[int]) -> list[int]:
         """Members of a batch that have given no result yet."""
@@ -75,6 +91,8 @@ class Wave:
         if left := self.left(members):
             ended = len(members) - len(left)
             self._fractions[left] = np.clip((progress.fraction * len(members) - ended) / len(left), 0.0, 1.0)
+        if self._begun is None and self._fraction > 0.0:
+            self._begun = (self._fraction, time.perf_counter())
         self._phases[batch] = progress.phase_counts
         self.report()
 
@@ -93,9 +111,8 @@ class Wave:
             phases.update(counts)
         if (waiting := total - done - phases.total()) > 0:
             phases["waiting"] += waiting
-        fraction = 1.0 if self.is_complete else float(self.costs @ self._fractions / self.costs.sum())
         seconds = time.perf_counter() - self._started
-        progress = WaveProgress(done, total, fraction, dict(phases), seconds, self._expected)
+        progress = WaveProgress(done, total, self._fraction, dict(phases), seconds, self._expected)
         self._call(self._on_progress, progress)
 
     def in_order(self) -> list[CaseResult]:

@@ -22,7 +22,7 @@ import typer
 from dem_warp import Case
 from dem_warp.batch import Batch
 from dem_warp.checkpoint import CHECKPOINT_EVERY, Checkpoints
-from experiments.cases.forecast.cost import cost_of
+from experiments.cases.forecast.work import work_of
 from experiments.evidence.machine import machine
 from experiments.evidence.performance.result_pages import write_results
 from experiments.studyfile import load_study
@@ -112,7 +112,7 @@ def row(name: str, case: Case, limit: float, pairs: int) -> dict[str, Any]:
     cost = float(np.median(each[:, 0])) if len(each) else 0.0
     return {
         "case": name,
-        "grains": cost_of(case).grains,
+        "grains": work_of(case).grains,
         "pairs": pairs,
         "s without": float(np.median(seconds)),
         "checkpoints in a run": len(each) / pairs,

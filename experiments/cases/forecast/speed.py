@@ -1,0 +1,136 @@
+"""The speed of a machine, which every finished batch notes, and the wall time that it makes a batch take."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import statistics
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from dem_warp import Case
+from experiments.cases.forecast.work import Work, work_of
+from experiments.io.files import read_file, write_text
+
+if TYPE_CHECKING:
+    from experiments.cases.workers.resources import Resources
+    from experiments.cases.workers.workers import Workers
+
+NOTES, FORMAT, LARGEST, KEPT = "dem-warp/batches.json", 1, 1_000_000, 1000
+"""File of the noted batches in the user's cache, its format, its most bytes, and the batches it keeps."""
+
+LEAST_SECONDS, LEAST_PART = 0.5, 0.5
+"""Shortest time [s] and least part of the work that give a speed: progress comes ten times a second."""
+
+FASTEST = {False: 1.0e9, True: 1.0e12}
+"""Sphere-steps a second that no core and no GPU reaches: 30 and 80 times the fastest that was measured."""
+
+NEAR_STEP, NEAR_SIZE, LATEST = 1.5, 2.0, 9
+"""Ratio of time steps and of spheres up to which a noted batch counts, and how many of the latest do."""
+
+UNKNOWN = "unknown until the first batch"
+"""Forecast of a machine on which no like batch has finished."""
+
+
+class Speed(NamedTuple):
+    """Speed of a worker while all are busy [sphere-steps/s], and where the number comes from."""
+
+    value: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Load:
+    """A batch, as its workers share it."""
+
+    machine: str
+    on_gpu: bool
+    kind: str
+    spheres: float
+    """Spheres that a worker has at once: those of a case on a CPU, of a launch on a GPU."""
+    time_step: float
+    """Geometric mean of the cases' time steps [s]."""
+    sphere_steps: float
+    """Sphere-steps of the busiest worker."""
+
+    @classmethod
+    def of(cls, works: Sequence[Work], workers: Workers | Resources) -> Load:
+        """Share cases between workers."""
+        total, kind = sum(work.spheres for work in works), "; ".join(sorted({work.kind for work in works}))
+        step = statistics.geometric_mean(work.time_step for work in works)
+        if not workers.on_gpu:
+            each = [work.spheres * work.steps for work in works]
+            busiest = max(sum(each) / workers.count, *each)
+            return cls(workers.machine, False, kind, total / len(works), step, busiest)
+        from experiments.cases.workers.batches import rounds_of
+
+        grains = sum(work.grains for work in works)
+        rounds = rounds_of(len(works), grains, workers.count, sharing=workers.sharing)
+        launch = total / min(rounds * workers.count, len(works))
+        longest = rounds * launch * max(work.steps for work in works)
+        return cls(f"{workers.machine}, {workers.sharing} a GPU", True, kind, launch, step, longest)
+
+    def is_like(self, other: Load) -> bool:
+        """Tell that another batch runs at much the same speed."""
+        step, size = self.time_step / other.time_step, self.spheres / other.spheres
+        near = 1.0 / NEAR_STEP <= step <= NEAR_STEP and 1.0 / NEAR_SIZE <= size <= NEAR_SIZE
+        return near and (self.machine, self.kind) == (other.machine, other.kind)
+
+
+def _notes() -> Path:
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / NOTES
+
+
+def noted_batches() -> list[tuple[Load, float]]:
+    """Return the noted batches and their speeds, the latest last, without those that cannot be true."""
+    try:
+        content = json.loads(read_file(_notes(), LARGEST))
+        rows = content["batches"] if content["format"] == FORMAT else []
+        found = [(Load(**row["load"]), float(row["speed"])) for row in rows]
+        return [(load, speed) for load, speed in found if _is_possible(load, speed)]
+    except (OSError, ValueError, TypeError, LookupError, RecursionError):
+        return []
+
+
+def _is_possible(load: Load, speed: float) -> bool:
+    sizes = (load.spheres, load.time_step, load.sphere_steps)
+    return all(0.0 < size < math.inf for size in sizes) and 0.0 < speed < FASTEST[load.on_gpu]
+
+
+def note_batch(cases: Sequence[Case[Any]], workers: Workers, part: float, seconds: float) -> None:
+    """Note the speed of a finished batch, a part of which took a time [s], where it can be true."""
+    if seconds < LEAST_SECONDS or part < LEAST_PART:
+        return
+    try:
+        load = Load.of([work_of(case) for case in cases], workers)
+        if _is_possible(load, speed := load.sphere_steps * part / seconds):
+            rows = [{"load": asdict(one), "speed": value} for one, value in [*noted_batches(), (load, speed)]]
+            write_text(_notes(), json.dumps({"format": FORMAT, "batches": rows[-KEPT:]}) + "\n")
+    except (ValueError, TypeError, AttributeError, OSError):
+        return  # a run goes on without a note
+
+
+def noted_speed(machine: str, like: Load | None = None) -> Speed | None:
+    """Return the median speed of a machine's latest batches, or of those like a given one."""
+    rows = [(load, speed) for load, speed in noted_batches() if load.machine.startswith(machine)]
+    speeds = [speed for load, speed in rows if like is None or load.is_like(like)]
+    batches = f"{len(speeds)} {'batch' if len(speeds) == 1 else 'batches'}"
+    return Speed(statistics.median(speeds[-LATEST:]), f"from {batches} on this machine") if speeds else None
+
+
+def forecast(works: Sequence[Work], workers: Workers | Resources) -> tuple[float | None, str]:
+    """Predict the wall time of a batch [s], None where it is unknown, and say where it comes from."""
+    load = Load.of(works, workers)
+    speed = noted_speed(load.machine, load)
+    return (load.sphere_steps / speed.value, speed.source) if speed else (None, UNKNOWN)
+
+
+def expected_seconds(cases: Sequence[Case[Any]], workers: Workers) -> float | None:
+    """Predict the wall time of a batch [s]; None where it is unknown."""
+    try:
+        return forecast([work_of(case) for case in cases], workers)[0]
+    except (ValueError, TypeError, AttributeError):
+        return None
