@@ -19,7 +19,6 @@ from experiments.cases import Resources
 from experiments.cases.forecast.speed import UNKNOWN, forecast
 from experiments.cases.forecast.work import work_of
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.cases.workers.batches import batch_memory
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.fresh_cases import cases_for
 from experiments.discover.search import Search
@@ -148,7 +147,7 @@ def _plan(study: Study, resources: Resources, stages: Sequence[_Stage], stored: 
     try:
         batches = tuple(_batch(*stage, resources) for stage in stages)
         cases = [case for _, some, *_ in stages for case in some]
-        memory = batch_memory(cases, max((stage[3] for stage in stages), default=0), resources)
+        memory = resources.memory(cases, max((stage[3] for stage in stages), default=0))
     except ValueError as error:  # the reason why a case cannot begin
         raise StudyError(str(study.file), str(error), study.scale or "this study") from error
     disk = PAGE_BYTES + stored * sum(batch.most for batch in batches)

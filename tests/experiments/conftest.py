@@ -14,6 +14,7 @@ import pytest
 
 from dem_warp import CaseResult
 from dem_warp.clump_fitting import fit_clump
+from experiments.cases.forecast import speed
 from experiments.report import solid
 from experiments.studyfile import Study, load_study
 
@@ -43,6 +44,14 @@ def _small_pictures() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(solid, "PIXELS", solid.PIXELS // 5)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_notes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Note the speed of batches in a folder of the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(speed, "NOTES", str(tmp_path_factory.mktemp("notes") / "batches.json"))
         yield
 
 

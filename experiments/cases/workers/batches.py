@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from dem_warp.laws.contact_law import memory_size
 from dem_warp.room import neighbour_room
 from dem_warp.simulation import batches
 from experiments.cases.forecast.work import work_of
-
-if TYPE_CHECKING:
-    from experiments.cases.workers.resources import Resources
 
 WORLDS = 1024
 """Worlds that one launch on a GPU holds at the most: few enough that a killed run loses little."""
@@ -28,9 +25,6 @@ GPU_WORKERS = 2
 """Workers of a GPU, each with a launch of its own in a process of its own, where workers are processes that
 are started here: while the host makes the worlds of one launch, looks at them or sends their results, another
 has the GPU. One GPU without a cluster has one, this process."""
-
-PROCESS_BYTES = 450e6
-"""Memory of a process that simulates or measures [bytes]."""
 
 IDLE_SPHERES = 100.0
 """Spheres that cost as much as a step without any."""
@@ -131,15 +125,3 @@ def relative_work(cases: Sequence[Case[Any]]) -> np.ndarray:
         except (ValueError, TypeError, AttributeError):
             found.append(1.0)
     return np.array(found, dtype=np.float64)
-
-
-def batch_memory(cases: Sequence[Case[Any]], most: int, workers: Resources) -> float:
-    """Predict the memory of this machine, or of each GPU, that at most so many such cases take [bytes]."""
-    if not cases:
-        return 0.0
-    largest = max(cases, key=lambda case: work_of(case).spheres)
-    each = device_bytes(largest)
-    if not workers.on_gpu:
-        return (each + PROCESS_BYTES) * min(workers.count, most) + PROCESS_BYTES
-    rounds = rounds_of(most, most * work_of(largest).grains, workers.count, sharing=workers.sharing)
-    return each * workers.sharing * -(-most // (workers.count * rounds))

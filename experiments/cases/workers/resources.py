@@ -5,17 +5,23 @@ from __future__ import annotations
 import os
 import platform
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import warp as wp
 
+from dem_warp import Case
 from dem_warp.device import resolve_device
-from experiments.cases.workers.batches import GPU_WORKERS
+from experiments.cases.forecast.work import work_of
+from experiments.cases.workers.batches import GPU_WORKERS, device_bytes, rounds_of
 from experiments.io.errors import InputError
 from experiments.studyfile.cluster_section import ClusterSection
 
 _ADDRESS = re.compile(r"((tcp|tls|wss?|ucxx?)://)?([\w.-]+|\[[\da-fA-F:.]+(%[\w.-]+)?\]):(?P<port>\d{1,5})")
 """Address of a scheduler, as Dask takes it: a name or number of a host, and a port."""
+
+PROCESS_BYTES = 450e6
+"""Memory of a process that simulates or measures [bytes]."""
 
 MOST_PER_CORE = 8
 """Processes a core of this machine: more gain nothing, and a measurement of speed has a case for each."""
@@ -107,6 +113,17 @@ class Resources:
             rule = f"expected counts processes of this machine, at most {MOST_PER_CORE} a core: {MOST_PER_CORE * cores}"
             raise InputError(self._place_of_workers, rule, asked)
         return asked or cores
+
+    def memory(self, cases: Sequence[Case], most: int) -> float:
+        """Predict the memory of this machine, or of each GPU, for at most so many such cases [bytes]."""
+        if not cases:
+            return 0.0
+        largest = max(cases, key=lambda case: work_of(case).spheres)
+        each = device_bytes(largest)
+        if not self.on_gpu:
+            return (each + PROCESS_BYTES) * min(self.count, most) + PROCESS_BYTES
+        rounds = rounds_of(most, most * work_of(largest).grains, self.count, sharing=self.sharing)
+        return each * self.sharing * -(-most // (self.count * rounds))
 
     def _in_whole_jobs(self, asked: int, each: int) -> int:
         # Dask would end what is over, with all of its job, and submit that job again, without end

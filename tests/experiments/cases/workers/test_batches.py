@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dem_warp import Case, CaseResult, Progress, simulate
+from dem_warp import Case, CaseResult, Progress
 from experiments.cases import OwnWorkers
-from experiments.cases.forecast.cost import cost_of, device_bytes, relative_costs
+from experiments.cases.forecast.work import work_of
 from experiments.cases.workers import batches, own
-from experiments.cases.workers.batches import plan_batches
+from experiments.cases.workers.batches import device_bytes, plan_batches, relative_work
 from experiments.cases.workers.wave import Wave, WaveProgress
 from experiments.studyfile import Study, load_study
 
@@ -49,20 +49,12 @@ class Stub:
 # ---- cost --------------------------------------------------------------------------------------------------
 
 
-def test_steps_are_predicted_within_a_half(small_study: Study) -> None:
-    case = small_study.case({"E": 0.4}, 1)
-    [result] = simulate([case], "cpu", 1)
-    taken = sum(phase["steps"] for phase in result.phases)
-    assert 1 / 1.5 < cost_of(case).steps / taken < 1.5
-    assert cost_of(case).grains == result.observables["grain_count"] == 30
-
-
 def test_a_case_costs_what_its_steps_and_spheres_do(write_study: Write) -> None:
     study = load_study(write_study())
     stiff = load_study(study.file, "stiff")
     more = load_study(write_study(("grain_count = 30", "grain_count = 300")))
     soft, hard, large = (each.case({}, 1) for each in (study, stiff, more))
-    costs = relative_costs([soft, hard, large])
+    costs = relative_work([soft, hard, large])
     # A time step follows from the square root of the modulus, which is 400 times as high.
     assert costs[1] / costs[0] == pytest.approx(20.0, rel=0.01)
     assert costs[2] > 2.0 * costs[0]
@@ -90,7 +82,7 @@ def test_on_gpus_workers_get_batches_of_like_cost_that_their_memory_holds(
     monkeypatch.setattr(batches, "WORLDS", 3)
     assert sorted(len(batch) for batch in plan_batches(cases, costs, 1, memory=1e12)) == [2, 3, 3]
     # As full as can be: six worlds of ten thirds that fill a GPU are two launches of three, not three of two.
-    monkeypatch.setattr(batches, "FULL_GRAINS", 3.3 * cost_of(cases[0]).grains)
+    monkeypatch.setattr(batches, "FULL_GRAINS", 3.3 * work_of(cases[0]).grains)
     assert list(map(len, plan_batches(cases[:6], costs[:6], 1, memory=1e12))) == [3, 3]
     assert list(map(len, plan_batches(cases[:4], costs[:4], 1, memory=1e12))) == [2, 2]
     monkeypatch.setattr(batches, "WORLDS", 1024)
@@ -102,7 +94,7 @@ def test_on_gpus_workers_get_batches_of_like_cost_that_their_memory_holds(
 def test_the_launches_of_workers_that_share_a_gpu_fill_it_together(
     cases: list[Case], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(batches, "FULL_GRAINS", 4.0 * cost_of(cases[0]).grains)
+    monkeypatch.setattr(batches, "FULL_GRAINS", 4.0 * work_of(cases[0]).grains)
     costs = np.ones(8)
     assert list(map(len, plan_batches(cases, costs, 1, 1e12))) == [4, 4]
     assert list(map(len, plan_batches(cases, costs, 2, 1e12, sharing=2))) == [2] * 4

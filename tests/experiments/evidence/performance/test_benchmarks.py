@@ -14,7 +14,7 @@ from dem_warp.batch import Batch
 from dem_warp.rollback import Rollback
 from dem_warp.solver import CHUNK
 from dem_warp.walls import Cylinder, Disc, Plane
-from experiments.cases.forecast.cost import device_bytes
+from experiments.cases.workers.batches import device_bytes
 from experiments.evidence.performance import columns as scene
 from experiments.evidence.performance.columns import Columns, reference_case
 from experiments.evidence.performance.contact_counts import count_contacts, placed_centers

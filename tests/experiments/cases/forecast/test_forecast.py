@@ -1,0 +1,169 @@
+"""Forecasts of wall time: work that is predicted, speeds that are noted, and what they say of a batch."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import asdict, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from dem_warp import MECHANISMS, SCENES, simulate
+from experiments.cases import OwnWorkers
+from experiments.cases.forecast import speed
+from experiments.cases.forecast.speed import (
+    UNKNOWN,
+    Load,
+    expected_seconds,
+    forecast,
+    note_batch,
+    noted_speed,
+)
+from experiments.cases.forecast.work import Work, work_of
+from experiments.cases.workers.wave import Wave, WaveProgress
+from experiments.commands.console import describe_progress
+from experiments.studyfile import Study
+
+WORK = Work("balls", 100, 100, 1.0e-5, 1.0e6)
+
+
+@pytest.fixture(autouse=True)
+def notes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(speed, "NOTES", str(tmp_path / "notes" / "batches.json"))
+    return tmp_path / "notes" / "batches.json"
+
+
+def crew(count: int = 2, on_gpu: bool = False, sharing: int = 1, machine: str = "this") -> Any:
+    return SimpleNamespace(count=count, on_gpu=on_gpu, sharing=sharing, machine=machine)
+
+
+def test_no_scene_and_no_law_is_named_by_the_forecast() -> None:
+    files = [*Path(speed.__file__).parent.glob("*.py"), Path("experiments/runs/plan.py")]
+    text = "\n".join(file.read_text(encoding="utf-8") for file in files)
+    names = [*SCENES, *MECHANISMS, *(kind.__name__ for kind in [*SCENES.values(), *MECHANISMS.values()])]
+    assert len(names) > 20
+    assert [name for name in names if re.search(rf"\b{re.escape(name)}\b", text)] == []
+
+
+# ---- work --------------------------------------------------------------------------------------------------
+
+
+def test_steps_are_predicted_within_a_half(small_study: Study) -> None:
+    case = small_study.case({"E": 0.4}, 1)
+    [result] = simulate([case], "cpu", 1)
+    steps = sum(phase["steps"] for phase in result.phases)
+    work = work_of(case)
+    assert 1 / 1.5 < work.steps / steps < 1.5
+    assert work.grains == work.spheres == result.observables["grain_count"] == 30
+
+
+def test_a_case_takes_its_rain_and_the_phases_that_its_test_expects(small_study: Study) -> None:
+    case = small_study.case({}, 1)
+    more = replace(case, scene=replace(case.scene, grain_count=330))
+    seconds = [work_of(each).steps * each.time_step for each in (case, more)]
+    assert seconds[1] - seconds[0] == pytest.approx(300 / case.scene.rain_rate)
+    fixed = replace(case, scene=replace(case.scene, duration=2.5))
+    assert work_of(fixed).steps * case.time_step == pytest.approx(2.5)
+
+
+# ---- shares ------------------------------------------------------------------------------------------------
+
+
+def test_cores_share_the_work_and_none_ends_before_its_longest_case() -> None:
+    assert Load.of([WORK] * 8, crew()).sphere_steps == pytest.approx(4.0e8)
+    long = replace(WORK, steps=9.0e6)
+    assert Load.of([WORK, long], crew()).sphere_steps == pytest.approx(9.0e8)
+
+
+def test_the_worlds_of_a_launch_step_together_until_the_last_one_ends() -> None:
+    load = Load.of([WORK] * 30 + [replace(WORK, steps=2.0e6)], crew(1, on_gpu=True))
+    assert (load.spheres, load.sphere_steps) == (3100.0, pytest.approx(3100 * 2.0e6))
+    two = Load.of([WORK] * 30, crew(2, on_gpu=True))
+    assert (two.spheres, two.sphere_steps) == (1500.0, pytest.approx(1500 * 1.0e6))
+
+
+# ---- speeds ------------------------------------------------------------------------------------------------
+
+
+def note(works: list[Work], workers: Any, seconds: float, part: float = 1.0) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(speed, "work_of", lambda work: work)
+        note_batch(works, workers, part, seconds)  # type: ignore[arg-type]
+
+
+def test_the_time_is_unknown_until_a_like_batch_has_finished_here() -> None:
+    assert forecast([WORK] * 4, crew()) == (None, UNKNOWN)
+    note([WORK] * 4, crew(), 20.0)
+    assert forecast([WORK] * 8, crew()) == (pytest.approx(40.0), "from 1 batch on this machine")
+    note([WORK] * 4, crew(), 10.0)
+    assert forecast([WORK] * 4, crew()) == (pytest.approx(2.0e8 / 1.5e7), "from 2 batches on this machine")
+    unlike = (
+        replace(WORK, kind="rods"), replace(WORK, spheres=201), replace(WORK, time_step=2.0e-5),
+    )  # fmt: skip
+    for work in unlike:
+        assert forecast([work] * 4, crew()) == (None, UNKNOWN)
+    assert forecast([WORK], crew(machine="another")) == (None, UNKNOWN)
+
+
+def test_a_launch_of_another_size_tells_nothing_of_a_gpu() -> None:
+    note([WORK] * 30, crew(1, on_gpu=True), 10.0)
+    assert forecast([WORK] * 50, crew(1, on_gpu=True))[0] == pytest.approx(10.0 * 5 / 3)
+    assert forecast([WORK] * 70, crew(1, on_gpu=True)) == (None, UNKNOWN)
+    assert forecast([WORK] * 30, crew(2, on_gpu=True, sharing=2)) == (None, UNKNOWN)
+
+
+def test_impossible_speeds_are_not_noted_and_one_outlier_counts_little(notes: Path) -> None:
+    note([WORK], crew(), 0.01)
+    note([WORK], crew(), 50.0, part=0.1)
+    note([replace(WORK, steps=1.0e9)], crew(), 1.0)
+    assert not notes.exists()
+    for seconds in (10.0, 10.0, 200.0):
+        note([WORK], crew(), seconds)
+    assert forecast([WORK], crew())[0] == pytest.approx(10.0)
+
+
+def test_a_damaged_file_and_speeds_of_an_earlier_format_are_ignored(notes: Path) -> None:
+    notes.parent.mkdir()
+    load = asdict(Load.of([WORK], crew()))
+    rows: list[Any] = [{"load": load, "speed": 1.0e7}]
+    for text in ('{"this": {"step": 1e-7}}', "[]", "{", json.dumps({"format": 0, "batches": rows})):
+        notes.write_text(text, encoding="utf-8")
+        assert noted_speed("this") is None
+    rows += [{"load": load, "speed": value} for value in (0.0, -1.0, 1.0e12)]
+    rows += [{"load": load | {"spheres": 0.0}, "speed": 1.0e7}]
+    notes.write_text(json.dumps({"format": 1, "batches": rows}), encoding="utf-8")
+    assert noted_speed("this") == (1.0e7, "from 1 batch on this machine")
+
+
+def test_a_finished_batch_notes_its_speed(small_study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed, "LEAST_SECONDS", 0.0)
+    cases = [small_study.case({}, seed) for seed in (1, 2)]
+    workers = OwnWorkers("cpu", 1)
+    assert expected_seconds(cases, workers) is None
+    workers.simulate(cases)
+    found = noted_speed(workers.machine)
+    assert found is not None
+    assert 1.0e4 < found.value < 1.0e8
+    assert 0.0 < (expected_seconds(cases, workers) or 0.0) < 600.0
+
+
+def test_cases_that_failed_early_leave_no_speed(small_study: Study) -> None:
+    wave = Wave([small_study.case({}, 1)], None, None)
+    wave._begun = (0.1, 0.0)
+    for status, part in (("finished", 0.9), ("failed", 0.0)):
+        wave.results = {0: SimpleNamespace(status=status)}  # type: ignore[dict-item]
+        assert wave.pace[0] == pytest.approx(part)
+
+
+def test_the_time_left_follows_the_progress_after_a_tenth() -> None:
+    begun = WaveProgress(0, 10, 0.0, {"waiting": 10}, 4.0, expected=100.0)
+    assert describe_progress(begun).startswith("1 min 36 s left")
+    late = WaveProgress(0, 10, 0.0, {"fill": 2}, 200.0, expected=100.0)
+    assert describe_progress(late).startswith("10 s left")
+    half = WaveProgress(5, 10, 0.5, {"lift": 2}, 300.0, expected=100.0)
+    assert describe_progress(half).startswith("5 min 0 s left")
+    unknown = WaveProgress(0, 10, 0.0, {}, 4.0)
+    assert "left" not in describe_progress(unknown)

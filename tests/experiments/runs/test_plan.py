@@ -1,0 +1,178 @@
+"""What ``--dry-run`` and ``dem-warp doctor`` say before anything runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import warp as wp
+from commandline import dem_warp
+
+from experiments import api
+from experiments.cases.forecast import speed
+from experiments.cases.forecast.speed import Speed
+from imaging import save_picture
+
+Write = Callable[..., Path]
+
+TRIAL = Path(api.__file__).parent / "studies" / "trial" / "study.toml"
+
+
+@pytest.fixture(autouse=True)
+def _noted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let twelve batches of a million sphere-steps a second be noted."""
+    monkeypatch.setattr(speed, "noted_speed", lambda *_: Speed(1.0e6, "from 12 batches on this machine"))
+
+
+# ---- plans -------------------------------------------------------------------------------------------------
+
+
+def planned(*words: object) -> dict:
+    code, out, err = dem_warp(*words, "--device", "cpu", "--workers", 2, "--dry-run", "--json")
+    assert code == 0, err
+    return json.loads(out)
+
+
+def test_a_calibration_is_planned_and_nothing_is_written(write_study: Write, tmp_path: Path) -> None:
+    study, out = write_study(), tmp_path / "out"
+    plan = planned("calibrate", study, "--out", out)
+    assert not out.exists()
+    waves = {wave["name"]: wave for wave in plan["batches"]}
+    # Five replicates and eight runs of the screening; six steps twice, once or twice over; a line of two
+    # points with five at its centre; five fresh cases.
+    assert waves["target, noise floor, screening"]["cases"] == 5 + 8
+    assert (waves["climb"]["cases"], waves["climb"]["most"]) == (12, 24)
+    assert waves["verification"]["cases"] == 5
+    assert waves["climb"]["grains"] == waves["climb"]["spheres"] == 30
+    assert plan["cases"] == sum(wave["cases"] for wave in plan["batches"])
+    assert waves["climb"]["seconds"] == pytest.approx(6 * waves["climb"]["steps"] * 30 / 1.0e6, rel=0.01)
+    assert plan["memory"] > 1e8
+    assert plan["disk"] > 0
+
+
+def test_published_runs_are_planned_before_the_campaign_or_alone() -> None:
+    runs = {
+        "screening": 12,
+        "climb": 6,
+        "composite": 13,
+        "verification": 3,
+    }  # Tables 3, 5 and 6, and the heaps beside
+    words = ("calibrate", "--scale", "bench", "--paper-replicates", 2)
+    alone = planned(*words, "--only-paper")
+    both = planned(*words, "--follow-paper")
+    cases = {wave["name"]: wave["cases"] for wave in alone["batches"]}
+    assert cases == {f"paper, {stage}": 2 * count for stage, count in runs.items()}
+    assert both["cases"] == alone["cases"] + planned("calibrate", "--scale", "bench")["cases"]
+    assert both["seconds"] > alone["seconds"] > 0
+
+
+def test_a_plan_reads_well(write_study: Write, tmp_path: Path) -> None:
+    code, out, _ = dem_warp("calibrate", write_study(), "--device", "cpu", "--workers", 2, "--dry-run")
+    assert code == 0
+    assert "verification" in out
+    assert "Nothing was run, nothing was written." in out
+    assert "from 12 batches on this machine" in out
+    assert "Not counted: compiling kernels" in out
+
+
+def test_a_time_that_nobody_knows_is_unknown(write_study: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed, "noted_speed", lambda *_: None)
+    words = ("calibrate", write_study(), "--device", "cpu", "--workers", 2, "--dry-run")
+    code, out, _ = dem_warp(*words)
+    assert (code, "Time: unknown until the first batch." in out) == (0, True)
+    assert json.loads(dem_warp(*words, "--json")[1])["seconds"] is None
+
+
+def test_cases_that_cannot_begin_have_no_plan(write_study: Write) -> None:
+    study = write_study(("grain_count = 30", 'grain_count = 30\nrain_rate = "1e12 1/s"'))
+    code, _, err = dem_warp("calibrate", study, "--device", "cpu", "--workers", 2, "--dry-run")
+    assert (code, "the rain finds no free place" in err) == (2, True), err
+
+
+def test_a_search_is_planned(tmp_path: Path) -> None:
+    plan = planned("discover", TRIAL, "--scale", "bench", TRIAL.with_name("tilted-bench.csv"))
+    assert [wave["name"] for wave in plan["batches"]] == ["fresh runs"], "the bank ships with the study"
+    assert 0 < plan["cases"] < plan["most"]
+
+
+def test_the_plan_of_a_search_reads_the_data(tmp_path: Path) -> None:
+    heaps = Path(__file__).parents[1] / "discover" / "data" / "nothing-missing.csv"
+    plan = planned("discover", TRIAL, "--scale", "bench", heaps)
+    assert (plan["cases"], plan["most"]) == (0, 0), "heaps without a gap ask for no fresh run"
+    wrong = tmp_path / "measured.csv"
+    wrong.write_text("condition,replicate,observable,value\nnone,1,height,0.01\n", encoding="utf-8")
+    for file, said in ((wrong, "measured.csv:2: condition"), (tmp_path / "absent.csv", "absent.csv")):
+        words = ["discover", TRIAL, "--scale", "bench", file, "--device", "cpu", "--dry-run"]
+        code, out, err = dem_warp(*words)
+        assert (code, out) == (2, "")
+        assert said in err
+
+
+def test_plans_tell_what_was_set_aside(
+    write_study: Write, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    save_picture(tmp_path / "wall.png", np.full((300, 500), 200, np.uint8))
+    rows = "condition,replicate,observable,value,unit,picture\nbase,1,angle,25,deg,\nbase,2,angle,26,deg,\n"
+    rows += "base,1,height,40,m,\nbase,2,flank_angle,,,wall.png\n"
+    (tmp_path / "measured.csv").write_text(rows, encoding="utf-8")
+    target = ('mean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', 'file = "measured.csv"\n')
+    planned("calibrate", write_study(target, add="[condition.base]\n"))
+    calibration, _ = caplog.text, caplog.clear()
+    planned("discover", TRIAL, "--scale", "bench", tmp_path / "measured.csv")
+    for said in (calibration, caplog.text):
+        assert "row 4: height must be between" in said
+        assert "row 5: the picture cannot be measured" in said
+
+
+def test_a_heap_is_planned_with_its_settings(write_study: Write) -> None:
+    plan = planned_heap(write_study())
+    assert plan["cases"] == plan["most"] == 1
+
+
+def planned_heap(study: Path) -> dict:
+    code, out, err = dem_warp("heap", study, "--set", "E=0.3", "--device", "cpu", "--dry-run", "--json")
+    assert code == 0, err
+    return json.loads(out)
+
+
+def test_jobs_are_not_submitted_for_a_plan(write_study: Write, tmp_path: Path) -> None:
+    profile = tmp_path / "cluster.toml"
+    profile.write_text('[cluster]\nkind = "slurm"\nworkers = 4\nqueue = "main"\n', encoding="utf-8")
+    words = ("calibrate", write_study(), "--cluster", profile, "--dry-run")
+    code, out, _ = dem_warp(*words)
+    assert code == 0
+    assert "4 workers of slurm" in out
+
+
+# ---- doctor ------------------------------------------------------------------------------------------------
+
+
+def test_the_doctor_tells_what_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.runs.examination.noted_speed", lambda _: None)
+    code, out, err = dem_warp("doctor", "--device", "cpu", "--workers", 2, "--json")
+    assert code == 0, err
+    found = {finding["name"]: finding for finding in json.loads(out)}
+    for name in ("versions", "cores", "memory", "kernels' cache", "simulation", "OpenGL", "clusters"):
+        assert name in found
+    assert found["simulation"]["good"]
+    assert found["will be used"]["text"].startswith("cpu, 2 at once")
+    assert not found["speed"]["good"], "nothing like it was noted"
+
+
+def test_the_doctors_exit_code_tells_that_nothing_can_be_simulated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path / "file" / "cache"))
+    code, out, _ = dem_warp("doctor", "--device", "cpu")
+    assert code == 1
+    assert "FAIL kernels' cache" in out
+
+
+def test_a_device_that_is_not_there_ends_with_2() -> None:
+    code, _, err = dem_warp("doctor", "--device", "cuda:7")
+    assert code == 2
+    assert "--device" in err
