@@ -1,4 +1,4 @@
-"""The public names: each is loaded with its module when it is first used."""
+"""Public names; a module is imported when its name is first used."""
 
 from .case import Case, Numerics
 from .clumps import ClumpShape

@@ -1,10 +1,10 @@
-"""Worlds that run in one launch, each under the controller of its scene."""
+"""Worlds that run in one launch, each with the controller of its scene."""
 
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -16,10 +16,10 @@ from dem_warp.provenance import engine_fingerprint, provenance
 from dem_warp.result import CaseResult
 from dem_warp.rollback import Rollback
 from dem_warp.room import neighbour_room
-from dem_warp.scenes.scene import course_of
+from dem_warp.scenes.scene import restore_state
 from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
 from dem_warp.solver import CHUNK, Solver
-from dem_warp.types import Care, WorldFlag
+from dem_warp.types import CheckRate, WorldFlag
 
 _log = logging.getLogger(__name__)
 
@@ -35,21 +35,14 @@ ADVICE = {
     ),
     WorldFlag.LATE_REBUILD: (
         "failed",
-        "a grain or a wall outran the neighbour lists within a step at {time:.4f} s: "
+        "a grain or a wall was too fast for the neighbour lists at {time:.4f} s: "
         "raise numerics.skin, or lower time_step_fraction",
     ),
 }
 
 
-class Onlooker(Protocol):
-    """Sees a batch between two stretches of steps, and changes nothing of it.
-
-    On a CPU each process has a copy of its own, so that it can be pickled.
-    """
-
-    def __call__(self, batch: "Batch") -> None:
-        """Look at the batch, or do not: it is called often."""
-        ...
+OnAdvance = Callable[["Batch"], None]
+"""Callback with a running batch, which it must not change; processes on a CPU get a pickled copy."""
 
 
 class Batch:
@@ -60,9 +53,9 @@ class Batch:
     cases : sequence of Case
     device : str
     checkpoints : Checkpoints, optional
-        Where the cases are saved now and then, and go on from where an earlier run left them.
-    onlooker : Onlooker, optional
-        Called after every stretch of steps.
+        Files that the cases are saved to and continue from.
+    on_advance : OnAdvance, optional
+        Called after every `advance`.
     """
 
     def __init__(
@@ -70,7 +63,7 @@ class Batch:
         cases: Sequence[Case],
         device: str,
         checkpoints: Checkpoints | None = None,
-        onlooker: Onlooker | None = None,
+        on_advance: OnAdvance | None = None,
     ) -> None:
         self.cases = list(cases)
         self.setups = cases[0].scene.prepare(cases, device)
@@ -83,36 +76,36 @@ class Batch:
         self.steps = [0] * len(cases)
         self.provenance = provenance(self.solver.device, self.solver.precision.name)
         self._checkpoints, self._saved = checkpoints, time.monotonic()
-        self._onlooker = onlooker
+        self._on_advance = on_advance
         self._resume()
 
     def advance(self) -> list[tuple[int, CaseResult]]:
-        """Step until the next controller is due, let it decide, and return the worlds that ended."""
+        """Step until the next controller is due, let it decide, and return the results of ended worlds."""
         ahead = min(
             self.controllers[w].period - self.steps[w] % self.controllers[w].period for w in self.running
         )
         self._rollback.keep()
         self.solver.advance(ahead // CHUNK)
-        due = self._take_back_late(ahead)
+        due = self._restore_late(ahead)
         ended = self._look(due)
         if self._checkpoints and time.monotonic() - self._saved >= self._checkpoints.every:
             self.save()
-        if self._onlooker:
-            self._onlooker(self)
+        if self._on_advance:
+            self._on_advance(self)
         return ended
 
-    def _take_back_late(self, ahead: int) -> list[int]:
-        """Count the steps that were taken, save those of worlds whose lists were outrun; return who is due.
+    def _restore_late(self, ahead: int) -> list[int]:
+        """Count the steps taken, and return the worlds that are due for a look.
 
-        Such a world goes back and takes them again, with more care. One that outruns its lists even with the
-        greatest care is due at once: its end.
+        A world that was too fast for its lists goes back, to repeat the steps with more frequent checks. One
+        that was too fast even with a check in every step is due at once, and fails.
         """
         flags = self.solver.flags.numpy()
         late = {w for w in self.running if WorldFlag.LATE_REBUILD in WorldFlag(int(flags[w]))}
-        again = set() if self.solver.care == Care.EVERY_STEP else late
+        again = set() if self.solver.check_rate == CheckRate.EVERY_STEP else late
         for w in again:
             self._rollback.restore(w)
-        self.solver.care = Care(self.solver.care + 1) if again else Care.USUAL
+        self.solver.check_rate = CheckRate(self.solver.check_rate + 1) if again else CheckRate.USUAL
         for w in set(self.running) - again:
             self.steps[w] += ahead
         return [
@@ -121,47 +114,45 @@ class Batch:
         ]  # fmt: skip
 
     def fraction(self, world: int) -> float:
-        """Roughly how much of a world is done, 0 to 1."""
+        """Return roughly the fraction done of a world, 0 to 1."""
         if world not in self.running:
             return 1.0
         return self.controllers[world].fraction(self.steps[world] * self.setups[world].time_step)
 
     def phase(self, world: int) -> str:
-        """Phase that a world is in."""
-        return self.controllers[world].course.phase
+        """Return the phase of a world."""
+        return self.controllers[world].state.phase
 
     def case_name(self, world: int) -> str:
-        """Name of the case of a world, by which its checkpoint is known too."""
+        """Return the name of a world's case and of its checkpoint."""
         return case_name(self.cases[world])
 
     @cached_property
     def maker(self) -> dict[str, Any]:
-        """All that must be the same where a checkpoint goes on: libraries, device, engine."""
+        """Libraries, device and engine, which must be the same where a checkpoint continues."""
         engine = engine_fingerprint(*(kind for case in self.cases for kind in case.kinds))
         same = {name: value for name, value in self.provenance.items() if name not in ("dem-warp", "commit")}
         return same | {"engine": engine}
 
-    # ---- checkpoints ---------------------------------------------------------------------------------------
-
     def _resume(self) -> None:
-        """Bring every case that has a checkpoint to where an earlier run left it."""
+        """Continue every case that has a checkpoint."""
         if self._checkpoints is None:
             return
         for w, (case, controller) in enumerate(zip(self.cases, self.controllers, strict=True)):
             try:
                 if kept := self._checkpoints.load(case, self.maker):
-                    fresh, snapshot = controller.course, kept[1]
-                    controller.course = course_of(type(fresh), kept[0])
+                    fresh, snapshot = controller.state, kept[1]
+                    controller.state = restore_state(type(fresh), kept[0])
                     try:
-                        controller.fraction(0.0)  # knows the phase
+                        controller.fraction(0.0)  # raises on an unknown phase
                         put_snapshot(self.solver, w, snapshot)
                     except (LookupError, TypeError, ValueError):
-                        controller.course = fresh
+                        controller.state = fresh
                         raise
                     self.steps[w] = int(snapshot[STEP].item())
             except (LookupError, TypeError, ValueError) as error:
                 path = self._checkpoints.path(case)
-                _log.warning("%s: a checkpoint that cannot be used, its case starts afresh: %s", path, error)
+                _log.warning("%s: cannot use the checkpoint, its case starts again: %s", path, error)
 
     def save(self) -> None:
         """Write a checkpoint of every running case."""
@@ -169,13 +160,11 @@ class Batch:
             return
         for w in self.running:
             snapshot = take_snapshot(self.solver, w)
-            self._checkpoints.save(self.cases[w], self.maker, self.controllers[w].course, snapshot)
+            self._checkpoints.save(self.cases[w], self.maker, self.controllers[w].state, snapshot)
         self._saved = time.monotonic()
 
-    # ---- what the controllers decide -----------------------------------------------------------------------
-
     def _look(self, due: Sequence[int]) -> list[tuple[int, CaseResult]]:
-        """Let the controllers of the worlds that are due decide; results of those that ended."""
+        """Let the controllers of the due worlds decide, and return the results of those that ended."""
         flags = self.solver.flags.numpy()
         ended, moves = [], []
         for w, view in zip(due, self.solver.view(due), strict=True):
@@ -189,7 +178,7 @@ class Batch:
                     continue
                 verdict = ("failed" if decision.failure else "finished", decision.failure)
                 if not np.isfinite(view.positions[view.alive]).all():
-                    verdict = ("diverged", "a grain is nowhere: its position is no number")
+                    verdict = ("diverged", "the position of a grain is not finite")
             self.solver.stop(w)
             self.running.remove(w)
             ended.append((w, self.result(w, *verdict)))
@@ -197,8 +186,8 @@ class Batch:
         return ended
 
     def result(self, w: int, status: str = "running", reason: str = "") -> CaseResult:
-        """Result of a world as it stands now, which may be before its end."""
-        poses, course, setup = self.solver.poses(w), self.controllers[w].course, self.setups[w]
+        """Return the result of a world in its present state."""
+        poses, state, setup = self.solver.poses(w), self.controllers[w].state, self.setups[w]
         counts = {"rebuilds": float(self.solver.rebuilds.numpy()[w])}
         return CaseResult(
             status=status,
@@ -208,8 +197,8 @@ class Batch:
             sizes=setup.grains.sizes[poses["slots"]],
             shapes=setup.grains.shapes[poses["slots"]],
             clumps=stack_spheres(setup.shapes),
-            observables=course.observables | counts,
-            phases=course.phases,
+            observables=state.observables | counts,
+            phases=state.phases,
             provenance=self.provenance | {"laws": self.cases[w].laws.to_dict()},
         )
 
@@ -218,43 +207,43 @@ def begin(
     cases: Sequence[Case],
     device: str,
     checkpoints: Checkpoints | None = None,
-    onlooker: Onlooker | None = None,
+    on_advance: OnAdvance | None = None,
 ) -> tuple[Batch | None, list[int], dict[int, CaseResult]]:
-    """Begin a batch of those cases that can be, and fail the others.
+    """Begin a batch of the valid cases, and fail the others.
 
     Returns
     -------
     batch
-        None where no case can be begun.
+        None if no case is valid.
     begun
-        Index of the case of each of its worlds.
+        Index of the case of each world.
     refused
-        Results of the others by their indices, each with its reason.
+        Results of the other cases by index, each with its reason.
     """
     try:
-        return Batch(cases, device, checkpoints, onlooker), list(range(len(cases))), {}
+        return Batch(cases, device, checkpoints, on_advance), list(range(len(cases))), {}
     except (ValueError, MemoryError):
         faults = {i: _fault(case, device) for i, case in enumerate(cases)}
         refused = {i: _refusal(cases[i], reason, device) for i, reason in faults.items() if reason}
         if not refused:
             raise
         begun = [i for i in range(len(cases)) if i not in refused]
-        batch = Batch([cases[i] for i in begun], device, checkpoints, onlooker) if begun else None
+        batch = Batch([cases[i] for i in begun], device, checkpoints, on_advance) if begun else None
         return batch, begun, refused
 
 
 def _fault(case: Case, device: str) -> str:
-    """Reason that a case has no world; empty where it has one."""
+    """Return the reason why a case cannot begin; empty if it can."""
     try:
         for setup in case.scene.prepare([case], device):
             neighbour_room(setup)
     except (ValueError, MemoryError) as error:
-        return str(error) or "there is not enough memory for it"
+        return str(error) or "out of memory"
     return ""
 
 
 def _refusal(case: Case, reason: str, device: str) -> CaseResult:
-    """Result of a case that cannot be begun: no grains."""
+    """Return the result of a case that cannot begin: no grains."""
     return CaseResult(
         status="failed",
         reason=reason,

@@ -1,7 +1,7 @@
-"""One simulation: what is simulated (scene, grains, contacts, seed) and how (numerics)."""
+"""One simulation: scene, grains, contacts, seed and numerics."""
 
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from dem_warp.laws.conventions import EDEM, ContactLaws
 from dem_warp.laws.mechanism import Mechanism, check_forms
@@ -19,21 +19,19 @@ PrecisionName = Literal["mixed", "double"]
 
 @dataclass(frozen=True)
 class Numerics:
-    """Settings of the computation of a case."""
+    """Numerical settings of a case."""
 
     time_step_fraction: Annotated[float, Parameter("1", above=0.0, at_most=1.0)] = 0.25
-    """Time step, as a fraction of the Rayleigh time of the smallest sphere; the paper uses 0.25."""
+    """Time step over the Rayleigh time of the smallest sphere; the paper uses 0.25."""
     skin: Annotated[float | None, Parameter("m", above=0.0)] = None
-    """Reach of the neighbour lists beyond contact, which affects the speed only; left out: from the step."""
+    """Reach of the neighbour lists beyond contact; it affects the speed only. Default: from the time step."""
     precision: PrecisionName = "mixed"
-    """Floating point precision of the forces."""
+    """Floating-point precision of the forces."""
     modulus_scale: Annotated[float, Parameter("1", at_least=1.0)] = 1.0
-    """The grains' shear modulus is divided by this (softer grains take larger steps)."""
+    """Divisor of the grains' shear modulus (softer grains allow larger steps)."""
 
     def __post_init__(self) -> None:
         check_parameters(self)
-        known = sorted(get_args(PrecisionName))
-        _require(self.precision in known, "Numerics.precision", f"must be one of {known}", self.precision)
 
 
 @dataclass(frozen=True)
@@ -41,32 +39,34 @@ class Case(Generic[SceneT]):
     """One scene with one set of parameters and one seed."""
 
     scene: SceneT
-    """Physical test, such as LiftedCylinder."""
+    """Physical test, e.g. LiftedCylinder."""
     grains: GrainPopulation
     grain_grain: Interaction
     grain_wall: Interaction
     seed: int = 0
-    """Seed of sizes, orientations and places of the grains."""
+    """Seed of the grains' sizes, orientations and places."""
     numerics: Numerics = field(default_factory=Numerics)
     mechanisms: tuple[Mechanism, ...] = ()
-    """Physical effects beside those of the base contact law. One at its null changes no result, but may
-    change the last bits: its code is compiled in."""
+    """Physical effects beyond the base contact law. A mechanism at its null changes no result, except the
+    last bits: its code is compiled in."""
     laws: ContactLaws = EDEM
     """Conventions of the contact law."""
     wall_parts: tuple[WallPart, ...] = field(default=(), metadata=LATER)
-    """Walls of another material than the rest, by the names that the scene has for them."""
+    """Parts of the walls with their own material."""
 
     def __post_init__(self) -> None:
         check_forms(tuple(type(mechanism) for mechanism in self.mechanisms), self.laws.forms)
         names = [part.name for part in self.wall_parts]
-        _require(len(set(names)) == len(names), "Case.wall_parts", "must name each part once", names)
+        if len(set(names)) < len(names):
+            raise ValueError(f"Case.wall_parts: must name each part once, got {names}")
         if names:
             self.scene.check_parts(names)
-        _require(0 <= self.seed < 2**63, "Case.seed", "must be an integer from 0 to 2^63 - 1", self.seed)
+        if not 0 <= self.seed < 2**63:
+            raise ValueError(f"Case.seed: must be an integer from 0 to 2^63 - 1, got {self.seed!r}")
 
     @property
     def grain_material(self) -> Material:
-        """The grains' material with the shear modulus that is simulated."""
+        """Material of the grains with the simulated shear modulus."""
         material = self.grains.material
         return Material(
             material.density, material.shear_modulus / self.numerics.modulus_scale, material.poisson_ratio
@@ -74,18 +74,18 @@ class Case(Generic[SceneT]):
 
     @property
     def time_step(self) -> float:
-        """[s]"""
+        """Time step [s]."""
         return self.numerics.time_step_fraction * rayleigh_time(
             self.grains.smallest_sphere, self.grain_material
         )
 
     @property
     def kinds(self) -> tuple[type, ...]:
-        """Classes of its scene and its mechanisms, whose code takes part in the result."""
+        """Classes of the scene and the mechanisms."""
         return (type(self.scene), *(type(mechanism) for mechanism in self.mechanisms))
 
     def contacts(self, wall_material: Material) -> tuple[ContactCoefficients, ContactCoefficients]:
-        """Contacts of grains with grains, and with walls of a material."""
+        """Return the contacts of grains with grains, and with walls of a material."""
         grain = self.grain_material
         return (
             self._contact("grains", grain, self.grain_grain),
@@ -93,7 +93,7 @@ class Case(Generic[SceneT]):
         )
 
     def contact_with(self, part: WallPart) -> ContactCoefficients:
-        """Contact of grains with a part of the walls."""
+        """Return the contact of grains with a part of the walls."""
         return self._contact("walls", part.material, part.surface)
 
     def _contact(self, kind: str, partner: Material, interaction: Interaction) -> ContactCoefficients:
@@ -107,7 +107,7 @@ class Case(Generic[SceneT]):
         )
 
     def _reduced(self, kind: str) -> tuple[float, float]:
-        """Reduced radius [m] and mass [kg] of a pair of the largest spheres, of grains of middle size."""
+        """Return the reduced radius [m] and mass [kg] of the largest spheres of mean grains."""
         share = 0.5 if kind == "grains" else 1.0
         size = self.grains.size_mean
         radius = max(float(shape.radii.max()) for shape in self.grains.mixture.shapes) * size
@@ -115,7 +115,7 @@ class Case(Generic[SceneT]):
         return share * radius, share * mass
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything that determines the result, as plain JSON values; the device and the skin do not."""
+        """Return everything that determines the result, as plain JSON values: neither device nor skin."""
         content = _plain(self)
         content["scene"] = {"kind": type(self.scene).__name__} | content["scene"]
         del content["numerics"]["skin"]
@@ -126,7 +126,7 @@ class Case(Generic[SceneT]):
 
 
 _BASE_LAW = {"clamp_attraction": False, "tangential_damping": True, "rolling_holds": True}
-"""Words for the base law in a case that names no laws, from before they had names: its key stays."""
+"""Entries of the base law in the content of a case, from before laws had names: keys stay valid."""
 
 
 def _plain(value: Any) -> Any:
@@ -137,11 +137,6 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "to_dict") and not isinstance(value, Case):
         return value.to_dict()
     if is_dataclass(value) and not isinstance(value, type):
-        told = ((f, getattr(value, f.name)) for f in fields(value))
-        return {f.name: _plain(own) for f, own in told if not (f.metadata == LATER and own == f.default)}
+        items = ((f, getattr(value, f.name)) for f in fields(value))
+        return {f.name: _plain(own) for f, own in items if not (f.metadata == LATER and own == f.default)}
     return value
-
-
-def _require(holds: bool, place: str, rule: str, value: Any) -> None:
-    if not holds:
-        raise ValueError(f"{place}: {rule}, got {value!r}")

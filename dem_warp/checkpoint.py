@@ -1,8 +1,8 @@
-"""Checkpoints: cases on disk half-way, so that a run that was killed goes on where it was.
+"""Checkpoints: running cases on disk, from which a killed run continues.
 
-Every running case has a file of its own, named by what the case is. It is written under a temporary name and
-then renamed, so that it is whole or absent, and it says what made it: one of another version of the engine or
-of another device, or a damaged one, is not used, and its case starts afresh.
+Every running case has a file named by its content. It is written under a temporary name and then renamed, so
+that it is complete or absent. A damaged file, or one of another engine version or device, is not used: its
+case starts again.
 """
 
 import hashlib
@@ -17,14 +17,14 @@ import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.reading import read_arrays
-from dem_warp.scenes.scene import Course
+from dem_warp.scenes.scene import SceneState
 from dem_warp.snapshot import Snapshot
 
 FORMAT = 1
-"""Version of the files; another one is not read."""
+"""Version of the file format."""
 
 CHECKPOINT_EVERY = 60.0
-"""Time between two checkpoints [s]: the most that a killed run loses."""
+"""Wall time between two checkpoints [s]: the most that a killed run loses."""
 
 _RECORD = "record"
 
@@ -37,7 +37,7 @@ class Checkpoints:
     Parameters
     ----------
     folder : str or Path
-        It is made with the first checkpoint.
+        Created with the first checkpoint.
     every : float
         Wall time between two checkpoints [s].
 
@@ -53,24 +53,16 @@ class Checkpoints:
         self.folder, self.every = Path(folder), every
 
     def path(self, case: Case) -> Path:
-        """File of a case."""
+        """Return the file of a case."""
         return self.folder / f"{case_name(case)}.npz"
 
-    def save(self, case: Case, maker: dict[str, Any], course: Course, snapshot: Snapshot) -> None:
-        """Save where a case is, replacing its earlier checkpoint.
+    def save(self, case: Case, maker: dict[str, Any], state: SceneState, snapshot: Snapshot) -> None:
+        """Save the state of a case's controller and the snapshot of its world.
 
-        Parameters
-        ----------
-        case : Case
-        maker : dict
-            What must be the same where the case goes on.
-        course : Course
-            Of its controller.
-        snapshot : dict of array
-            Of its world.
+        `maker` must be the same where the case continues.
         """
         path = self.path(case)
-        record = json.dumps({"format": FORMAT, "maker": maker, "course": asdict(course)})
+        record = json.dumps({"format": FORMAT, "maker": maker, "state": asdict(state)})
         arrays = snapshot | {_RECORD: np.frombuffer(record.encode(), dtype=np.uint8)}
         temporary = path.with_name(f".{path.stem}.{os.getpid()}")
         try:
@@ -81,10 +73,10 @@ class Checkpoints:
                 os.fsync(file.fileno())
             temporary.replace(path)
         except OSError as error:
-            _log.warning("%s: no checkpoint could be written, the case goes on without: %s", path, error)
+            _log.warning("%s: cannot write the checkpoint, the case continues without: %s", path, error)
 
     def load(self, case: Case, maker: dict[str, Any]) -> tuple[dict[str, Any], Snapshot] | None:
-        """Fields of the course, and snapshot, of a case that an earlier run left; None if there is none.
+        """Return the state's fields and the snapshot of a case from an earlier run, or None without a file.
 
         Raises
         ------
@@ -98,23 +90,23 @@ class Checkpoints:
             snapshot = read_arrays(path)
             record = json.loads(snapshot.pop(_RECORD).tobytes())
             found = {"format": record["format"]} | record["maker"]
-            course = dict(record["course"])
+            state = dict(record["state"])
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            raise ValueError(f"must be a whole file that a run wrote: {error}") from error
+            raise ValueError(f"the file is damaged: {error}") from error
         _require_same(found, {"format": FORMAT} | maker)
-        return course, snapshot
+        return state, snapshot
 
     def drop(self, case: Case) -> None:
-        """Remove the checkpoint of a case that has ended, if there is one."""
+        """Remove the checkpoint of a case, if any."""
         self.path(case).unlink(missing_ok=True)
 
 
 def case_name(case: Case) -> str:
-    """Name of a case while it runs: the hash of all that it says."""
+    """Return the name of a running case: the hash of its content."""
     content = {
         "case": case.to_dict(),
         "scene": type(case.scene).__name__,
-        # it does not change the result, but it is what the neighbour lists were made for
+        # it does not change the result, but the neighbour lists depend on it
         "skin": case.numerics.skin,
     }
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
@@ -128,4 +120,4 @@ def _require_same(found: dict[str, Any], expected: dict[str, Any]) -> None:
         if found.get(name) != expected.get(name)
     ]
     if differences:
-        raise ValueError(f"must come from this engine on this device, got {'; '.join(differences)}")
+        raise ValueError(f"the file is from another engine or device: {'; '.join(differences)}")

@@ -1,4 +1,4 @@
-"""Fill a grain's contour with inscribed spheres: chosen greedily, exchanged, and moved to cover the most."""
+"""Fill a grain's contour with inscribed spheres: chosen greedily, exchanged, and moved to cover more."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dem_warp.clumps import ClumpShape
 from dem_warp.device import resolve_device
 from dem_warp.kernels.mesh_depth import mesh_depth
+from dem_warp.parameters import Parameter
 from dem_warp.sphere_union import Array
 
 if TYPE_CHECKING:
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 
 Cover = NDArray[np.bool_]
 
-_CANDIDATES = 1500  # about so many samples are tried as centres: the exchange stays below some seconds
-_CHUNK = 256  # candidates handled at once, which bounds the memory
+_CANDIDATES = 1500  # approximate number of candidates for centres: the exchange takes some seconds
+_CHUNK = 256  # candidates at once, to limit the memory
 _MAX_SWEEPS = 100
 _SURFACE_POINTS = 4000
 _STEPS = np.array([step for step in product((-1.0, 0.0, 1.0), repeat=3) if any(step)])
@@ -27,7 +28,7 @@ _STEPS = np.array([step for step in product((-1.0, 0.0, 1.0), repeat=3) if any(s
 
 @dataclass(frozen=True)
 class ClumpFit:
-    """A clump and how well it fills the solid it was made for."""
+    """A clump and the quality of its fit to a solid."""
 
     shape: ClumpShape
     """The clump."""
@@ -38,40 +39,36 @@ class ClumpFit:
     overshoot: float
     """Volume of the spheres outside the solid over the solid's volume."""
     inertia_error: float
-    """Largest relative difference of a principal moment of inertia over the mass, both sorted."""
+    """Largest relative error of the sorted principal moments of inertia over the mass."""
     surface_distance: float
-    """Distance of the solid's surface from that of the spheres, root mean square [m]."""
+    """Root mean square distance of the solid's surface from that of the spheres [m]."""
     spheres: Array
     """Centre and radius of each sphere [m] in the solid's frame, shape (S, 4)."""
 
     @property
     def volume_error(self) -> float:
-        """Volume of the clump over the solid's, less 1."""
+        """Relative error of the volume."""
         return self.shape.volume / self.solid_volume - 1.0
 
 
 def fit_clump(solid: "Trimesh", sphere_count: int, protrusion: float = 0.0, resolution: int = 40) -> ClumpFit:
-    """Fill a closed surface with spheres so that they cover much of its volume.
+    """Fill a closed surface with spheres that cover much of its volume.
 
-    Each sphere in turn covers the most of what is left. Then each is exchanged for a better one, and moved,
-    its radius following the distance to the surface, as long as the covered volume grows. Nothing is random:
-    the same solid gives the same clump.
+    Each sphere in turn covers the most of the remaining volume. Then spheres are exchanged and moved, with
+    radii from the distance to the surface, as long as the covered volume grows. Nothing is random: the same
+    solid gives the same clump.
 
     Parameters
     ----------
     solid
         Closed surface [m], from `solids.read_mesh` or `solids.parse_solid`.
     sphere_count
-        Spheres wanted; fewer come back when further ones would cover nothing new.
+        Number of spheres; there are fewer if more would cover nothing new.
     protrusion
-        How far a sphere may pass the surface [m]: sharp edges are covered better, for some overshoot.
+        Largest distance of a sphere's surface outside the solid [m]: sharp edges are covered better.
     resolution
-        Samples along the solid's longest side. Coverage and overshoot are known to some 1 / resolution^1.5.
-
-    Returns
-    -------
-    ClumpFit
-        The clump in its principal frame, its coverage and overshoot.
+        Samples along the solid's longest side. Coverage and overshoot have errors of about
+        1 / resolution^1.5.
 
     Raises
     ------
@@ -102,13 +99,13 @@ def fit_clump(solid: "Trimesh", sphere_count: int, protrusion: float = 0.0, reso
 
 
 def _inertia_error(solid: "Trimesh", shape: ClumpShape) -> float:
-    """Largest relative difference of the principal moments over the mass, sorted."""
+    """Return the largest relative error of the sorted principal moments over the mass."""
     wanted = np.sort(np.linalg.eigvalsh(np.asarray(solid.moment_inertia))) / solid.volume
     return float(np.abs(np.sort(shape.inertia_over_mass) / wanted - 1.0).max())
 
 
 def _surface_distance(solid: "Trimesh", spheres: Array) -> float:
-    """Root mean square distance of points of the solid's surface, always the same ones, from the spheres'."""
+    """Return the root mean square distance of fixed points of the solid's surface from the spheres'."""
     import trimesh
 
     points, _ = trimesh.sample.sample_surface(solid, _SURFACE_POINTS, seed=1)
@@ -132,7 +129,7 @@ class _Surface:
         )
 
     def depth(self, points: Array) -> Array:
-        """Distance of points (N, 3) to the surface, positive inside."""
+        """Return the distance of points (N, 3) to the surface, positive inside."""
         depths = wp.empty(len(points), dtype=wp.float32, device=self._device)
         queries: wp.array = wp.array(points, dtype=wp.vec3, device=self._device)
         wp.launch(mesh_depth, len(points), [self._mesh.id, queries], [depths], device=self._device)
@@ -148,7 +145,7 @@ class _Filling:
         self._protrusion = protrusion
 
     def radii(self, centers: Array) -> Array:
-        """Largest radii that keep the protrusion; zero for a centre outside the solid."""
+        """Return the largest radii within the protrusion; 0 for a centre outside the solid."""
         depths = self._surface.depth(centers)
         return np.where(depths > 0.0, depths + self._protrusion, 0.0)
 
@@ -157,7 +154,7 @@ class _Filling:
         return _within(self._samples, centers, self.radii(centers))
 
     def pick(self, candidates: Array, sphere_count: int) -> Array:
-        """Choose centres greedily, each for the most samples still open, then exchange them one by one."""
+        """Choose centres greedily, each for the most uncovered samples, then exchange them one by one."""
         chunks = np.split(candidates, range(_CHUNK, len(candidates), _CHUNK))
         covers = np.concatenate([self.cover(chunk) for chunk in chunks])
         chosen: list[int] = []
@@ -194,7 +191,7 @@ class _Filling:
         return centers
 
     def prune(self, centers: Array) -> Array:
-        """Leave out the spheres that cover nothing of their own, the smallest first."""
+        """Remove the spheres that cover nothing alone, the smallest first."""
         for center in centers[np.argsort(self.radii(centers), kind="stable")]:
             rest = centers[(centers != center).any(axis=1)]
             if len(rest) and _own_gain(self.cover(center[None])[0], self.cover(rest)) == 0:
@@ -203,7 +200,7 @@ class _Filling:
 
 
 def _best_cover(covers: Cover, chosen: list[int]) -> tuple[int, int]:
-    """Return the candidate that covers the most beside those chosen, and how many samples that is."""
+    """Return the candidate that covers most samples besides those chosen, and their number."""
     open_samples = ~covers[chosen].any(axis=0)
     gains = np.count_nonzero(covers[:, open_samples], axis=1)
     best = int(gains.argmax())
@@ -211,7 +208,7 @@ def _best_cover(covers: Cover, chosen: list[int]) -> tuple[int, int]:
 
 
 def _own_gain(cover: Cover, others: Cover) -> int:
-    """Count the samples that one sphere covers and no other does."""
+    """Return the number of samples that one sphere covers alone."""
     return int(np.count_nonzero(cover & ~others.any(axis=0)))
 
 
@@ -222,7 +219,7 @@ def _within(samples: Array, centers: Array, radii: Array) -> Cover:
 
 
 def _sample_box(surface: _Surface, resolution: int, margin: float) -> tuple[Array, Array, float]:
-    """Cell centres of a grid over the solid's box and a margin, their depths, and the spacing."""
+    """Return the cell centres of a grid over the solid's box and a margin, their depths, and the spacing."""
     spacing = 1.0 / resolution
     counts = np.ceil((surface.box + 2.0 * margin) / spacing).astype(int)
     lowest = np.floor(-margin / spacing)
@@ -232,7 +229,7 @@ def _sample_box(surface: _Surface, resolution: int, margin: float) -> tuple[Arra
 
 
 def _thinned(samples: Array, spacing: float) -> Array:
-    """Every n-th sample along each axis, n such that about `_CANDIDATES` are left."""
+    """Return every n-th sample along each axis: about `_CANDIDATES`."""
     stride = max(1, round((len(samples) / _CANDIDATES) ** (1.0 / 3.0)))
     cells = np.rint(samples / spacing - 0.5).astype(int)
     return samples[(cells % stride == stride // 2).all(axis=1)]
@@ -240,12 +237,8 @@ def _thinned(samples: Array, spacing: float) -> Array:
 
 def _check_request(solid: "Trimesh", sphere_count: int, protrusion: float, resolution: int) -> None:
     if not solid.is_watertight or solid.volume <= 0.0:
-        raise ValueError(
-            f"the solid must be a closed surface turned outward, got volume {solid.volume:.3g} m3"
-        )
-    if sphere_count < 1:
-        raise ValueError(f"sphere_count must be 1 or more, got {sphere_count!r}")
-    if resolution < 8:
-        raise ValueError(f"resolution must be 8 or more, got {resolution!r}")
-    if not (np.isfinite(protrusion) and protrusion >= 0.0):
-        raise ValueError(f"protrusion must be finite and 0 or more [m], got {protrusion!r}")
+        rule = "must be a closed surface with faces turned outward"
+        raise ValueError(f"solid: {rule}, got volume {solid.volume:.3g} m3")
+    Parameter("1", at_least=1).check("sphere_count", sphere_count)
+    Parameter("1", at_least=8).check("resolution", resolution)
+    Parameter("m", at_least=0.0).check("protrusion", protrusion)

@@ -9,23 +9,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dem_warp.parameters import Parameter
 from dem_warp.reading import read_text
 from dem_warp.sphere_union import DEFAULT_RESOLUTION, Array, union_moments
 
 MOST_SPHERES = 256
-"""Spheres of a clump: their numbers have eight bits in a list of neighbours."""
+"""Most spheres of a clump in a file."""
 
 _MILLIMETER = 1e-3
-_LARGEST, _SMALLEST = 1e6, 1e-6  # of a file [mm]: its volume and moments are far from the ends of floats
-_MOMENT_TOLERANCE = 1e-4  # of the largest moment: less apart are equal, smaller products of inertia are none
+_LARGEST, _SMALLEST = 1e6, 1e-6  # [mm] in a file: volume and moments stay within the range of floats
+_MOMENT_TOLERANCE = 1e-4  # of the largest moment: smaller differences and products of inertia count as 0
 
 
 @dataclass(frozen=True, eq=False)
 class ClumpShape:
-    """A rigid set of spheres in its principal frame, the centre of mass of their union at the origin.
+    """Rigid set of spheres in its principal frame, the centre of mass of their union at the origin.
 
-    Build it with `from_spheres`, `read` or `sphere`, which compute the mass properties and the frame. Two
-    shapes are equal when their spheres are.
+    `from_spheres`, `read` and `sphere` compute the mass properties and the frame. Two shapes are equal when
+    their spheres are.
 
     Raises
     ------
@@ -46,9 +47,9 @@ class ClumpShape:
         centers, radii = _checked_spheres(self.centers, self.radii)
         moments = np.array(self.inertia_over_mass, dtype=np.float64)
         if moments.shape != (3,) or not (np.isfinite(moments) & (moments > 0.0)).all():
-            raise ValueError(f"inertia_over_mass must be three positive moments [m2], got {moments.tolist()}")
-        if not (np.isfinite(self.volume) and self.volume > 0.0):
-            raise ValueError(f"volume must be finite and positive [m3], got {self.volume!r}")
+            rule = "must be three positive moments [m2]"
+            raise ValueError(f"ClumpShape.inertia_over_mass: {rule}, got {moments.tolist()}")
+        Parameter("m^3", above=0.0).check("ClumpShape.volume", self.volume)
         for name, array in (("centers", centers), ("radii", radii), ("inertia_over_mass", moments)):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
@@ -91,15 +92,14 @@ class ClumpShape:
         centers, radii
             Spheres [m], shapes (S, 3) and (S,). Their order is kept.
         resolution
-            Gauss nodes a panel of the surface quadrature, see `sphere_union.union_moments`; by default 64,
-            for a relative error below 1e-4.
+            Gauss nodes of the surface quadrature, see `sphere_union.union_moments`. Default: 64, for a
+            relative error below 1e-4.
 
         Returns
         -------
         ClumpShape
-            The spheres, moved and turned into the principal frame of their union. Of all principal frames
-            it is the nearest to the frame given: axes are not sorted, axes of equal moments do not spin, and
-            axes that are principal stay. Equal and principal are meant within 1e-4 of the largest moment.
+            The spheres, moved and turned into the principal frame of their union that is nearest to the given
+            frame: axes are not sorted, and principal axes stay, within 1e-4 of the largest moment.
 
         Raises
         ------
@@ -113,21 +113,20 @@ class ClumpShape:
         return cls((centers - moments.center) @ axes, radii, moments.volume, principal)
 
     def elongated(self, elongation: float) -> "ClumpShape":
-        """Return the shape drawn out along its longest principal axis, its volume and its spheres as many.
+        """Return the shape stretched along its longest principal axis, with the same volume.
 
         Parameters
         ----------
         elongation
-            The centres go apart by this part along the axis of the least moment of inertia, then the whole is
-            scaled to the volume it had; 0 leaves the shape as it is.
+            Relative stretch of the centres along the axis of the least moment of inertia; the whole is then
+            scaled to its former volume. 0: no change.
 
         Raises
         ------
         ValueError
-            If the elongation is not finite or below 0, or there is one sphere only, which stays round.
+            If the elongation is not finite or below 0, or not 0 for a single sphere.
         """
-        if not (np.isfinite(elongation) and elongation >= 0.0):
-            raise ValueError(f"elongation: must be finite and 0 or more, got {elongation!r}")
+        Parameter("1", at_least=0.0).check("elongation", elongation)
         if elongation == 0.0:
             return self
         if self.sphere_count == 1:
@@ -141,23 +140,13 @@ class ClumpShape:
         )
 
     def scaled(self, scale: float) -> "ClumpShape":
-        """Return the shape larger by a factor, in the same frame."""
+        """Return the shape scaled by a factor, in the same frame."""
         moments = self.inertia_over_mass * scale**2
         return ClumpShape(self.centers * scale, self.radii * scale, self.volume * scale**3, moments)
 
     @classmethod
     def read(cls, path: str | Path) -> "ClumpShape":
-        """Read spheres, one a line: ``x y z r`` in mm; ``#`` starts a comment.
-
-        Parameters
-        ----------
-        path
-            Text file, its spheres in any frame.
-
-        Returns
-        -------
-        ClumpShape
-            The spheres in the principal frame of their union, as by `from_spheres`.
+        """Read spheres in any frame, one per line: ``x y z r`` in mm; ``#`` starts a comment.
 
         Raises
         ------
@@ -173,20 +162,14 @@ class ClumpShape:
             if words:
                 rows.append(_parse_sphere(words, f"{path}, line {number}"))
             if len(rows) > MOST_SPHERES:
-                raise ValueError(f"{path}: a clump has at most {MOST_SPHERES} spheres, got more")
+                raise ValueError(f"{path}: must have at most {MOST_SPHERES} spheres, got more")
         if not rows:
-            raise ValueError(f"{path}: a clump needs at least one line 'x y z r' [mm], got none")
+            raise ValueError(f"{path}: must have at least one line 'x y z r' [mm]")
         spheres = np.array(rows) * _MILLIMETER
         return cls.from_spheres(spheres[:, :3], spheres[:, 3])
 
     def write(self, path: str | Path) -> None:
-        """Write the spheres as `read` takes them, with the mass properties in comments.
-
-        Parameters
-        ----------
-        path
-            Text file; an existing one is replaced.
-        """
+        """Write the spheres for `read`, with the mass properties in comments; replace an existing file."""
         moments = " ".join(f"{moment / _MILLIMETER**2:.6g}" for moment in self.inertia_over_mass)
         lines = [
             "# Clump: x y z r of each sphere in mm, origin at the centre of mass, principal axes.",
@@ -198,13 +181,9 @@ class ClumpShape:
 
 
 def stack_spheres(shapes: Sequence[ClumpShape]) -> Array:
-    """Spheres of several shapes in one array.
+    """Return local centres and radii of the spheres of several shapes [m], (shapes, S, 4).
 
-    Returns
-    -------
-    Array
-        Local centre and radius of each sphere [m], shape (shapes, S, 4), S the largest number of spheres of
-        a shape; the others are filled up with zeros.
+    S is the largest number of spheres of a shape; the others are padded with zeros.
     """
     spheres = np.zeros((len(shapes), max(shape.sphere_count for shape in shapes), 4))
     for row, shape in zip(spheres, shapes, strict=True):
@@ -217,14 +196,13 @@ def _checked_spheres(centers: ArrayLike, radii: ArrayLike) -> tuple[Array, Array
     centers, radii = np.array(centers, dtype=np.float64), np.array(radii, dtype=np.float64)
     if radii.ndim != 1 or radii.size == 0 or centers.shape != (radii.size, 3):
         raise ValueError(
-            "spheres must be centers (S, 3) and radii (S,) with S >= 1, "
-            f"got shapes {centers.shape} and {radii.shape}"
+            "ClumpShape.centers, radii: must have shapes (S, 3) and (S,) with S >= 1, "
+            f"got {centers.shape} and {radii.shape}"
         )
     for index, (center, radius) in enumerate(zip(centers, radii, strict=True)):
         if not np.isfinite(center).all():
-            raise ValueError(f"sphere {index}: its center must be finite [m], got {center.tolist()}")
-        if not (np.isfinite(radius) and radius > 0.0):
-            raise ValueError(f"sphere {index}: its radius must be finite and positive [m], got {radius}")
+            raise ValueError(f"ClumpShape.centers[{index}]: must be finite [m], got {center.tolist()}")
+        Parameter("m", above=0.0).check(f"ClumpShape.radii[{index}]", float(radius))
     return centers, radii
 
 
@@ -234,25 +212,25 @@ def _parse_sphere(words: list[str], place: str) -> list[float]:
     except ValueError:
         row = []
     if len(row) != 4 or not np.isfinite(row).all() or row[3] <= 0.0:
-        rule = "a sphere is four finite numbers 'x y z r' [mm] with r > 0"
+        rule = "must be four finite numbers 'x y z r' [mm] with r > 0"
         raise ValueError(f"{place}: {rule}, got {' '.join(words)!r}")
     if max(map(abs, row)) > _LARGEST or row[3] < _SMALLEST:
-        rule = f"a sphere lies within {_LARGEST:g} mm, and its r is at least {_SMALLEST:g} mm"
+        rule = f"must be within {_LARGEST:g} mm, with r at least {_SMALLEST:g} mm"
         raise ValueError(f"{place}: {rule}, got {' '.join(words)!r}")
     return row
 
 
 def _principal_axes(inertia: Array) -> Array:
-    """Return the principal axes nearest to the present ones: a rotation matrix, an axis a column."""
+    """Return the principal axes nearest to the present ones as the columns of a rotation matrix."""
     moments, vectors = np.linalg.eigh(inertia)
     products = inertia - np.diag(np.diag(inertia))
     if np.abs(products).max() <= _MOMENT_TOLERANCE * moments[-1]:
         return np.eye(3)
     apart = np.diff(moments) > _MOMENT_TOLERANCE * moments[-1]
-    groups = np.concatenate([[0], np.cumsum(apart)])  # one number for each set of equal moments
+    groups = np.concatenate([[0], np.cumsum(apart)])  # a number for each set of equal moments
     projectors = [vectors[:, groups == g] @ vectors[:, groups == g].T for g in range(groups[-1] + 1)]
-    # slots[a] is the moment that axis a takes: the assignment that turns the axes least. Rounding lets a tie
-    # fall to the first one, whatever the last bits.
+    # slots[a] is the moment of axis a: the assignment that turns the axes least; by rounding, the first of a
+    # tie wins whatever the last bits
     slots = max(
         permutations(range(3)),
         key=lambda slots: round(float(sum(projectors[groups[s]][a, a] for a, s in enumerate(slots))), 9),

@@ -1,4 +1,4 @@
-"""Forces of the contacts of a world between two steps, found without a trace in its state."""
+"""Contact forces of a world between two steps, found without a change of its state."""
 
 from dataclasses import dataclass
 
@@ -11,44 +11,43 @@ from dem_warp.rollback import Rollback
 from dem_warp.solver import Solver
 
 NO_GRAIN = NO_WALL = -1
-"""Partner of a contact that is none of the kind."""
+"""Grain or wall number of a partner of the other kind."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactForces:
-    """Contacts that bear a force; each pair of spheres once, of a sphere and a wall too."""
+    """Contacts with a force: each pair of spheres, or of a sphere and a wall, once."""
 
     grains: np.ndarray
-    """Slot of the grain that the force acts on, shape (n,)."""
+    """Slot of the grain with the force, shape (n,)."""
     partners: np.ndarray
-    """Slot of the grain that it comes from, NO_GRAIN for a wall, shape (n,)."""
+    """Slot of the partner, NO_GRAIN for a wall, shape (n,)."""
     walls: np.ndarray
-    """Number of the wall that it comes from, NO_WALL for a grain, shape (n,)."""
+    """Number of the partner wall, NO_WALL for a grain, shape (n,)."""
     forces: np.ndarray
-    """[N], shape (n, 3)."""
+    """Forces [N], shape (n, 3)."""
     points: np.ndarray
-    """Place where the two surfaces meet [m], shape (n, 3)."""
+    """Places of the contacts [m], shape (n, 3)."""
     normals: np.ndarray
     """Unit vectors from the partner to the grain, shape (n, 3)."""
 
     def __len__(self) -> int:
-        """Count the contacts."""
+        """Return the number of contacts."""
         return len(self.grains)
 
 
 class ForceProbe:
-    """Finds the forces that the next step of a batch begins with.
+    """Measurement of the forces at the beginning of a batch's next step.
 
-    The law moves on the histories of the contacts that it is asked about. So all that steps change is kept
-    before and put back after: the run goes on to the same bits.
+    The law advances the histories of contacts, so the state is copied before and restored after.
     """
 
     def __init__(self, solver: Solver) -> None:
         self._solver, self._kept = solver, Rollback(solver)
-        self._bear = probe_kernels(solver.build).bear
+        self._measure = probe_kernels(solver.build).measure
 
     def forces(self, world: int) -> ContactForces:
-        """Contacts of a world, between two calls of `Solver.advance`."""
+        """Return the contacts of a world, between two calls of `Solver.advance`."""
         solver, real = self._solver, self._solver.precision
         slots, capacity = solver.layout.grain_count, solver.neighbours.capacity
         for wall in range(solver.layout.wall_count):
@@ -57,7 +56,7 @@ class ForceProbe:
         forces, points, normals = (*out, wp.zeros_like(out[0]))
         self._kept.keep()
         inputs = [world, solver.model, solver.grains[0], solver.alive, solver.neighbours]
-        wp.launch(self._bear, slots, inputs=[*inputs, forces, points, normals], device=solver.device)
+        wp.launch(self._measure, slots, inputs=[*inputs, forces, points, normals], device=solver.device)
         self._kept.restore(world)
         for reactions in (solver.neighbours.reactions.force, solver.neighbours.reactions.torque):
             reactions.zero_()
@@ -68,7 +67,7 @@ class ForceProbe:
     def _named(
         self, world: int, found: np.ndarray, forces: np.ndarray, points: np.ndarray, normals: np.ndarray
     ) -> ContactForces:
-        """Name the two of each entry that was found; of a pair that both lists have, the first stays."""
+        """Return the contacts of the entries found; a pair in two lists counts once."""
         solver, setup = self._solver, self._solver.worlds[world]
         layout, capacity = solver.layout, solver.neighbours.capacity
         grains = found // capacity
@@ -77,7 +76,7 @@ class ForceProbe:
         number = partner - layout.grain_count * layout.sphere_count
         is_wall = number >= 0
         partners = np.where(is_wall, NO_GRAIN, partner // layout.sphere_count)
-        # after the walls stand the triangles of the first mesh, of the next, and so on
+        # the triangles of the first mesh follow the walls, then those of the next
         counts = [wall.triangle_count for wall, _ in setup.walls]
         owners = np.concatenate([np.arange(layout.wall_count), np.repeat(np.arange(len(counts)), counts)])
         walls = np.where(is_wall, owners[np.where(is_wall, number, 0)], NO_WALL)

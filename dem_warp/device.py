@@ -1,4 +1,4 @@
-"""The device to run on."""
+"""Choice of the device, and start of Warp."""
 
 import os
 import sys
@@ -10,17 +10,12 @@ NO_DRIVER = "Could not find or load the NVIDIA CUDA driver"
 
 
 def resolve_device(device: str | None) -> str:
-    """Name of the device to run on: as asked, or the GPU if there is one.
-
-    Parameters
-    ----------
-    device : str, optional
-        "cpu", "cuda" or "cuda:N".
+    """Return the name of a device: "cpu", "cuda" or "cuda:N". Default: the GPU if there is one.
 
     Raises
     ------
     ValueError
-        If the device is not there.
+        If there is no such device.
     """
     _start_warp()
     known = [str(d) for d in wp.get_devices()]
@@ -28,23 +23,16 @@ def resolve_device(device: str | None) -> str:
         return "cuda:0" if wp.is_cuda_available() else "cpu"
     name = "cuda:0" if device == "cuda" else device
     if name not in known:
-        raise ValueError(_absent(device, known))
+        has_gpu = any(name.startswith("cuda") for name in known)
+        why = "" if has_gpu else " (no NVIDIA GPU with a CUDA driver was found)"
+        raise ValueError(f"device: must be one of {', '.join(known)}{why}, got {device!r}")
     return name
 
 
-def _absent(device: str, known: list[str]) -> str:
-    """Say why a device is not there."""
-    gpus = [name for name in known if name.startswith("cuda")]
-    if device.startswith("cuda") and not gpus:
-        return f"no NVIDIA GPU with a CUDA driver was found, so the device must be cpu, not {device}"
-    return f"the device must be one of {', '.join(known)}, not {device}"
-
-
 def _start_warp() -> None:
-    """Initialise Warp without its greeting and without its warning that no GPU was found, which is no fault.
+    """Initialise Warp without its greeting and its warning about a missing GPU.
 
-    The warning is written by native code, so the file descriptor is turned aside; anything else that comes is
-    passed on.
+    Native code writes the warning, so the file descriptor is redirected; all other lines are passed on.
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
     sys.stderr.flush()

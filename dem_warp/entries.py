@@ -1,23 +1,20 @@
-"""Entries of the neighbour lists: 31 bits, the own sphere's number above the partner's."""
+"""Entries of the neighbour lists: 31 bits, the own sphere's number above the partner's number."""
 
 MAX_SPHERES_PER_GRAIN = 256
 
 _MAX_PARTNER_BITS = 27
-"""Lists of more partners need more memory than one device has."""
+"""Limit from the memory of a device."""
 
 
 def partner_bits(sphere_count: int) -> int:
-    """Bits of an entry that hold the partner (a sphere, a wall or a triangle).
+    """Return the bits of an entry for the partner (a sphere, a wall or a triangle).
 
-    Parameters
-    ----------
-    sphere_count
-        Spheres of the grain that has most of them; their numbers take the bits above.
+    The bits above are for the spheres of a grain, at most `sphere_count`.
     """
     own = (sphere_count - 1).bit_length()
     return min(31 - own, _MAX_PARTNER_BITS)
 
 
 def max_partners(sphere_count: int) -> int:
-    """Partners that the entries of a world can tell apart."""
+    """Return the largest number of partners in a world."""
     return 1 << partner_bits(sphere_count)

@@ -1,4 +1,4 @@
-"""Frames of a running case: its grains, walls and contact forces, spread evenly over its whole time."""
+"""Frames of a running case: grains, walls and contact forces at equal intervals over its whole time."""
 
 import time
 from collections.abc import Callable
@@ -16,36 +16,36 @@ from dem_warp.result import CaseResult, OnProgress, Progress, place_spheres
 from dem_warp.walls import Wall
 
 LEAST_FRAMES = 2
-"""The first state and the last."""
+"""Least number of frames: the first state and the last."""
 
 FINENESS = 4
-"""Frames held at the most, times FINENESS of those asked for: how evenly they can then be chosen."""
+"""Most stored frames over the requested ones, so that these can be chosen at equal intervals."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """State of a world between two steps; grains that have yet to fall are left out."""
+    """State of a world between two steps, without grains that wait for their release."""
 
     time: float
-    """[s]."""
+    """Time [s]."""
     phase: str
     """Phase of the test."""
     grains: np.ndarray
     """Number of each grain, the same in every frame, shape (n,)."""
     positions: np.ndarray
     orientations: np.ndarray
-    """Centres of mass [m], and quaternions x y z w from the body to the world, shape (n, 3) and (n, 4)."""
+    """Centres of mass [m], (n, 3), and quaternions x y z w from the body to the world, (n, 4)."""
     velocities: np.ndarray
     spins: np.ndarray
-    """[m/s] and [rad/s], in the frame of the world, shape (n, 3)."""
+    """Velocities [m/s] and spins [rad/s] in the world's frame, shape (n, 3)."""
     wall_poses: tuple[tuple[np.ndarray, np.ndarray], ...]
-    """Place of each wall's own point [m], and how far the wall has turned (quaternion x y z w)."""
+    """Place of each wall's own point [m] and orientation of the wall (quaternion x y z w)."""
     contacts: ContactForces
 
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """Frames of one case, and what is the same in all of them."""
+    """Frames of one case, and the data common to all."""
 
     walls: tuple[Wall, ...]
     """Walls before the first motion."""
@@ -55,15 +55,15 @@ class Film:
     shapes: np.ndarray
     """Index of its shape into `clumps`, shape (m,)."""
     clumps: np.ndarray
-    """As in `CaseResult`."""
+    """Spheres of the shapes, as in `CaseResult`."""
     masses: np.ndarray
-    """[kg], shape (m,)."""
+    """Mass of every grain [kg], shape (m,)."""
     volumes: np.ndarray
-    """Volume of every grain, overlaps of its spheres counted once [m3], shape (m,)."""
+    """Volume of every grain, with overlaps counted once [m3], shape (m,)."""
     frames: tuple[Frame, ...] = ()
 
     def spheres(self, frame: Frame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Spheres of a frame: centres [m], (s, 3), radii [m], (s,), and row of their grain in it, (s,)."""
+        """Return the spheres of a frame: centres [m], (s, 3), radii [m] and row of their grain, (s,)."""
         sizes, shapes = self.sizes[frame.grains], self.shapes[frame.grains]
         return place_spheres(frame.positions, frame.orientations, sizes, self.clumps[shapes])
 
@@ -71,27 +71,26 @@ class Film:
 def simulate_frames(
     case: Case, count: int, device: str | None = None, on_progress: OnProgress | None = None
 ) -> tuple[CaseResult, Film | None]:
-    """Simulate one case, and keep frames of it. The result is that of `simulate`, to the bit.
+    """Simulate one case, and return its result, with the bits of `simulate`, and frames.
 
     Parameters
     ----------
     case : Case
     count : int
-        Frames, the first state and the last among them; a case that ends sooner than it is looked at so often
-        has fewer.
+        Frames, including the first state and the last; a very short case has fewer.
     device, on_progress
-        As of `simulate`.
+        As in `simulate`.
 
     Returns
     -------
     result : CaseResult
     film : Film or None
-        None where the case could not begin.
+        None if the case could not begin.
 
     Raises
     ------
     ValueError
-        If `count` is below LEAST_FRAMES, or the device is not there.
+        If `count` is below LEAST_FRAMES, or there is no such device.
     """
     if count < LEAST_FRAMES:
         raise ValueError(f"simulate_frames.count: must be {LEAST_FRAMES} or more, got {count!r}")
@@ -115,13 +114,13 @@ def simulate_frames(
 
 
 class _Camera:
-    """Takes frames of the only world of a batch."""
+    """Source of frames of the only world of a batch."""
 
     def __init__(self, batch: Batch) -> None:
         self._batch, self._probe = batch, ForceProbe(batch.solver)
 
     def frame(self) -> Frame:
-        """Take the present state."""
+        """Return the present state."""
         solver, setup = self._batch.solver, self._batch.setups[0]
         step = int(solver.grains[0].step.numpy()[0])
         poses = solver.poses(0)
@@ -135,7 +134,7 @@ class _Camera:
         )  # fmt: skip
 
     def film(self, frames: tuple[Frame, ...]) -> Film:
-        """Join frames to what they share."""
+        """Return the film of some frames."""
         setup, scene = self._batch.setups[0], self._batch.cases[0].scene
         numbered = tuple(f"wall-{number}" for number in range(len(setup.walls)))
         return Film(
@@ -151,9 +150,9 @@ class _Camera:
 
 
 class _Reel:
-    """Frames at equal distances over a run whose length is not known before its end.
+    """Frames at equal intervals over a run of unknown length.
 
-    When there are too many, every second one goes, and from then on only every second one is taken.
+    When there are too many, every second one is dropped and the interval doubles.
     """
 
     def __init__(self, count: int) -> None:
@@ -161,7 +160,7 @@ class _Reel:
         self._frames: list[Frame] = []
 
     def offer(self, number: int, take: Callable[[], Frame]) -> None:
-        """Take the frame of a look at the world, by the look's number, if it is one of those to keep."""
+        """Store the frame of a look, by the look's number, if it is due."""
         if number % self._stride:
             return
         self._frames.append(take())
@@ -169,10 +168,10 @@ class _Reel:
             self._frames, self._stride = self._frames[::2], 2 * self._stride
 
     def close(self, take: Callable[[], Frame]) -> None:
-        """Take the last frame of a run."""
+        """Store the last frame of a run."""
         self._frames.append(take())
 
     def chosen(self) -> tuple[Frame, ...]:
-        """Frames asked for, the first and the last among them."""
+        """Return the requested number of frames, with the first and the last."""
         places = np.linspace(0, len(self._frames) - 1, min(self._count, len(self._frames)))
         return tuple(self._frames[place] for place in np.rint(places).astype(int))

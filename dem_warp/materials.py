@@ -1,22 +1,17 @@
 """Bulk materials, pairs of surfaces, and the contact constants that follow from them."""
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
-
-def _require(holds: bool, rule: str, name: str, value: float) -> None:
-    if not holds:
-        raise ValueError(f"{name} must be {rule}, got {value!r}")
-
-
-def _is_positive(value: float) -> bool:
-    return math.isfinite(value) and value > 0.0
+from dem_warp.parameters import Parameter, check_parameters
 
 
 @dataclass(frozen=True)
 class Material:
-    """An isotropic, linearly elastic solid.
+    """Isotropic, linearly elastic solid.
 
     Raises
     ------
@@ -24,26 +19,23 @@ class Material:
         If a value lies outside its range.
     """
 
-    density: float
-    """Mass of the solid by its volume [kg/m3], positive."""
-    shear_modulus: float
-    """Shear modulus [Pa], positive."""
-    poisson_ratio: float
-    """Poisson's ratio, above -1 and at most 0.5, the limits of a stable isotropic solid."""
+    density: Annotated[float, Parameter("kg/m^3", above=0.0)]
+    """Density of the solid."""
+    shear_modulus: Annotated[float, Parameter("Pa", above=0.0)]
+    """Shear modulus."""
+    poisson_ratio: Annotated[float, Parameter("1", above=-1.0, at_most=0.5)]
+    """Poisson's ratio; the limits are those of a stable isotropic solid."""
 
     def __post_init__(self) -> None:
-        _require(_is_positive(self.density), "finite and positive [kg/m3]", "density", self.density)
-        _require(
-            _is_positive(self.shear_modulus), "finite and positive [Pa]", "shear_modulus", self.shear_modulus
-        )
-        _require(
-            -1.0 < self.poisson_ratio <= 0.5, "above -1 and at most 0.5", "poisson_ratio", self.poisson_ratio
-        )
+        check_parameters(self)
 
     @property
     def youngs_modulus(self) -> float:
         """Young's modulus [Pa], ``2 G (1 + v)``."""
         return 2.0 * self.shear_modulus * (1.0 + self.poisson_ratio)
+
+
+_RESTITUTION = Parameter("1", above=0.0, at_most=1.0)
 
 
 @dataclass(frozen=True)
@@ -56,34 +48,31 @@ class Interaction:
         If a value lies outside its range.
     """
 
-    restitution: float
-    """Coefficient of restitution, above 0 (whose damping would be critical) and at most 1 (none)."""
-    static_friction: float
-    """Coulomb coefficient of static friction, 0 or more."""
-    rolling_friction: float
-    """Coefficient of rolling friction, 0 or more."""
+    restitution: Annotated[float, _RESTITUTION]
+    """Coefficient of restitution; 1 is without damping."""
+    static_friction: Annotated[float, Parameter("1", at_least=0.0)]
+    """Coulomb coefficient of static friction."""
+    rolling_friction: Annotated[float, Parameter("1", at_least=0.0)]
+    """Coefficient of rolling friction."""
 
     def __post_init__(self) -> None:
-        _require(0.0 < self.restitution <= 1.0, "above 0 and at most 1", "restitution", self.restitution)
-        for name in ("static_friction", "rolling_friction"):
-            value = getattr(self, name)
-            _require(math.isfinite(value) and value >= 0.0, "finite and 0 or more", name, value)
+        check_parameters(self)
 
 
 @dataclass(frozen=True)
 class WallPart:
-    """Walls of one name that are of another material than the rest."""
+    """Named part of the walls with its own material."""
 
     name: str
-    """Name that the scene has for them, as ``"ends"`` of a drum."""
+    """Name in the scene, e.g. ``"ends"`` of a drum."""
     material: Material
-    """Their material."""
+    """Material of the part."""
     surface: Interaction
-    """Contact of grains with them."""
+    """Contact of grains with the part."""
 
 
 def rayleigh_time(radius: float, material: Material) -> float:
-    """Time that a Rayleigh wave takes to cross a sphere's half circumference.
+    """Return the time that a Rayleigh wave takes to cross a sphere's half circumference.
 
     Parameters
     ----------
@@ -107,13 +96,13 @@ def rayleigh_time(radius: float, material: Material) -> float:
     Thornton and Randall (1988), in Micromechanics of Granular Materials, 133-142; the time step of a
     simulation is a fraction of it.
     """
-    _require(_is_positive(radius), "finite and positive [m]", "radius", radius)
+    Parameter("m", above=0.0).check("rayleigh_time.radius", radius)
     speed_ratio = 0.1631 * material.poisson_ratio + 0.8766
     return math.pi * radius * math.sqrt(material.density / material.shear_modulus) / speed_ratio
 
 
 def effective_moduli(a: Material, b: Material) -> tuple[float, float]:
-    """Effective Young's and shear moduli of two bodies in contact.
+    """Return the effective Young's and shear moduli of two bodies in contact.
 
     Returns
     -------
@@ -131,12 +120,7 @@ def effective_moduli(a: Material, b: Material) -> tuple[float, float]:
 
 
 def damping_coefficient(restitution: float) -> float:
-    """Dimensionless damping that gives a Hertz contact the restitution asked for.
-
-    Parameters
-    ----------
-    restitution
-        Coefficient of restitution, above 0 and at most 1.
+    """Return the dimensionless damping that gives a Hertz contact a restitution.
 
     Returns
     -------
@@ -154,23 +138,23 @@ def damping_coefficient(restitution: float) -> float:
     Tsuji, Tanaka and Ishida (1992), Powder Technology 71, 239-250, in the form of the Hertz-Mindlin
     (no slip) model of EDEM.
     """
-    _require(0.0 < restitution <= 1.0, "above 0 and at most 1", "restitution", restitution)
+    _RESTITUTION.check("restitution", restitution)
     log_restitution = math.log(restitution)
     return 2.0 * math.sqrt(5.0 / 6.0) * abs(log_restitution) / math.hypot(log_restitution, math.pi)
 
 
 TSUJI_POLYNOMIAL = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
-"""LAMMPS' fit of Tsuji's damping over sqrt(4/3 E* sqrt(R* d) m*), highest power of the restitution first."""
+"""Fit by LAMMPS of Tsuji's damping over sqrt(4/3 E* sqrt(R* d) m*), highest power of restitution first."""
 
 THORNTON_POLYNOMIAL = (
     -1489.915, 6276.757, -11342.18, 11494.29, -7206.864, 2928.711, -796.4559, 146.8049, -16.41105, -6.918798,
     0.0,
 )  # fmt: skip
-"""Thornton's fit of the exponent that Yade takes the damping ratio from, highest power first."""
+"""Thornton's fit of the exponent in Yade's damping ratio, highest power first."""
 
 
 def tsuji_damping(restitution: float) -> float:
-    """Dimensionless damping that LAMMPS takes for a restitution, as `damping_coefficient` has it.
+    """Return the damping of `damping_coefficient` that LAMMPS uses for a restitution.
 
     Raises
     ------
@@ -181,14 +165,12 @@ def tsuji_damping(restitution: float) -> float:
     ----------
     LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 987-991, damping tsuji.
     """
-    _require(0.0 < restitution <= 1.0, "above 0 and at most 1", "restitution", restitution)
+    _RESTITUTION.check("restitution", restitution)
     return math.sqrt(2.0 / 3.0) * max(_polynomial(TSUJI_POLYNOMIAL, restitution), 0.0)
 
 
 def thornton_damping(restitution: float) -> float:
-    """Dimensionless damping that Yade takes for a restitution, as `damping_coefficient` has it.
-
-    It gives the restitution to a damping that never attracts.
+    """Return the damping of `damping_coefficient` that Yade uses for a restitution, without attraction.
 
     Raises
     ------
@@ -200,7 +182,7 @@ def thornton_damping(restitution: float) -> float:
     C. Thornton, S. J. Cummins and P. W. Cleary, Powder Technology 233 (2013) 30-46, equations B6 and B7;
     Yade, pkg/dem/HertzMindlin.cpp, Ip2_FrictMat_FrictMat_MindlinPhys::go.
     """
-    _require(0.0 < restitution <= 1.0, "above 0 and at most 1", "restitution", restitution)
+    _RESTITUTION.check("restitution", restitution)
     if restitution == 1.0:
         return 0.0
     exponent = _polynomial(THORNTON_POLYNOMIAL, restitution)
@@ -208,10 +190,7 @@ def thornton_damping(restitution: float) -> float:
 
 
 def _polynomial(coefficients: tuple[float, ...], x: float) -> float:
-    total = 0.0
-    for coefficient in coefficients:
-        total = total * x + coefficient
-    return total
+    return functools.reduce(lambda total, coefficient: total * x + coefficient, coefficients, 0.0)
 
 
 DAMPINGS: Mapping[str, Callable[[float], float]] = {
@@ -219,4 +198,4 @@ DAMPINGS: Mapping[str, Callable[[float], float]] = {
     "polynomial": tsuji_damping,
     "thornton": thornton_damping,
 }
-"""Dimensionless damping from the restitution, by the name that the conventions give it."""
+"""Dimensionless damping from the restitution, by the name in `ContactLaws.restitution`."""

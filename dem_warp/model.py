@@ -1,9 +1,10 @@
-"""Parts of one world, described on the host, and the stacking of many worlds into arrays."""
+"""Parts of one world, described on the host."""
 
 import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Annotated
 
 import numpy as np
 
@@ -13,13 +14,14 @@ from dem_warp.laws.conventions import BASE_FORMS, EDEM, ContactLaws, LawForms
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism, Mechanisms, check_forms, clashes
 from dem_warp.materials import DAMPINGS, Interaction, Material, effective_moduli
+from dem_warp.parameters import Parameter, check_parameters
 from dem_warp.walls import Wall
 
 GRAVITY = 9.81
-"""[m/s2]"""
+"""Gravity [m/s2]."""
 
 ROLLING_OVERLAP = 0.01
-"""Overlap of equal spheres, over their radius, at which a rolling spring is as stiff as the tangential."""
+"""Overlap of equal spheres, over their radius, where a default rolling spring equals the tangential one."""
 
 AT_ONCE = 0
 """Release step of a grain that is free from the start."""
@@ -37,22 +39,22 @@ class ContactCoefficients:
     static_friction: float
     rolling_friction: float
     clamp_attraction: bool = False
-    """Keeps the damping from attracting at the end of an impact."""
+    """True if the damping must not attract at the end of an impact."""
     mechanisms: tuple[Mechanism, ...] = ()
-    """Mechanisms beside the base law."""
+    """Mechanisms in addition to the base law."""
     tangential_damping: float = 1.0
-    """Damping of the tangential spring over what the same constant makes of its own stiffness."""
+    """Factor of the tangential damping from `damping` and the tangential stiffness."""
     rolling_spring: float = 0.0
-    """Spring of a rolling resistance that takes one: a factor [1], a spring [N/m] or a torque's [N m/rad]."""
+    """Spring of the rolling resistance: a factor [1], or a stiffness [N/m] or [N m/rad]."""
     rolling_dashpot: float = 0.0
-    """Its dashpot [kg/s], or its damping ratio [1]."""
+    """Dashpot [kg/s] or damping ratio [1] of the rolling resistance."""
 
     def __post_init__(self) -> None:
         names = [mechanism.name for mechanism in self.mechanisms]
         if len(set(names)) < len(names):
             raise ValueError(f"ContactCoefficients.mechanisms: must be different, got {names}")
         for name, other in clashes(self.mechanisms):
-            raise ValueError(f"ContactCoefficients.mechanisms: {name} must not stand beside {other}")
+            raise ValueError(f"ContactCoefficients.mechanisms: {name} excludes {other}")
 
     @classmethod
     def of_pair(
@@ -65,9 +67,9 @@ class ContactCoefficients:
         radius: float = 0.0,
         mass: float = 0.0,
     ) -> "ContactCoefficients":
-        """Coefficients of two materials in contact under some laws.
+        """Return the coefficients of two materials in contact under some laws.
 
-        Reduced radius [m] and mass [kg] are those that a rolling spring of one stiffness is made for.
+        Reduced radius [m] and mass [kg] are for a rolling spring of constant stiffness.
         """
         modulus, shear_modulus = effective_moduli(a, b)
         # the area of the overlap circle is twice Hertz's, 2 R* d
@@ -89,19 +91,19 @@ class ContactCoefficients:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Fields of `ContactParams`; a mechanism that is not there is at its null."""
+        """Fields of `ContactParams`; absent mechanisms are at their null."""
         apart = ("mechanisms", "rolling_spring", "rolling_dashpot")
         base = {f.name: float(getattr(self, f.name)) for f in fields(self) if f.name not in apart}
-        # laws that take a spring or a dashpot share the places of the mechanism that has both
+        # the spring and dashpot of a law use the fields of the mechanism that has both
         rolling = {"rolling_stiffness": self.rolling_spring, "rolling_damping": self.rolling_dashpot}
         own = {name: value for m in self.mechanisms for name, value in m.parameters.items()}
         return base | _nulls() | rolling | own
 
 
 def _tangential_share(laws: ContactLaws, modulus: float, shear_modulus: float) -> float:
-    """Tangential damping over what the constant makes of its own stiffness, or over the normal damping."""
+    """Return the factor of the tangential damping, or of the normal damping that it uses."""
     if laws.tangential_damping == "normal":
-        # sqrt(S_n / S_t) makes the normal damping of the tangential one
+        # sqrt(S_n / S_t) turns the tangential damping into the normal one
         return math.sqrt(modulus / (4.0 * shear_modulus)) if laws.normal_damping == "tsuji" else 1.0
     return {"tsuji": 1.0, "deme": math.sqrt(2.0), "none": 0.0}[laws.tangential_damping]
 
@@ -109,7 +111,7 @@ def _tangential_share(laws: ContactLaws, modulus: float, shear_modulus: float) -
 def _rolling_spring(
     laws: ContactLaws, shear_modulus: float, radius: float, mass: float
 ) -> tuple[float, float]:
-    """Spring and dashpot of a rolling resistance, in its own units; none for those that make their own."""
+    """Return spring and dashpot of a rolling resistance, in its own units; 0 if it computes them itself."""
     if laws.rolling == "elastic_plastic":
         return laws.rolling_stiffness, laws.rolling_damping
     if laws.rolling not in ("sds", "yade"):
@@ -124,28 +126,28 @@ def _rolling_spring(
 
 @functools.cache
 def _nulls() -> dict[str, float]:
-    """Parameters of every mechanism of the library at its null."""
+    """Return the parameters of every mechanism of the library at its null."""
     absent = (kind() for kind in MECHANISMS.values())
     return {name: value for mechanism in absent for name, value in mechanism.parameters.items()}
 
 
 @dataclass(frozen=True, eq=False)
 class Grains:
-    """Grains of one world at the start."""
+    """Initial grains of one world."""
 
     positions: np.ndarray
     orientations: np.ndarray
-    """Poses [m], quaternions x y z w, shape (n, 3) and (n, 4)."""
+    """Positions [m], shape (n, 3), and orientations as quaternions x y z w, shape (n, 4)."""
     velocities: np.ndarray
     spins: np.ndarray
-    """[m/s] and [rad/s], both in the world's frame, shape (n, 3)."""
+    """Velocities [m/s] and spins [rad/s] in the world's frame, shape (n, 3)."""
     sizes: np.ndarray
     densities: np.ndarray
     """Scale of the shape [1] and density [kg/m3], shape (n,)."""
     shapes: np.ndarray
     """Index into the world's shapes, shape (n,)."""
     release_steps: np.ndarray
-    """A grain keeps its velocity, and feels nothing, before this step, shape (n,)."""
+    """First step with forces on a grain; before it the velocity is constant, shape (n,)."""
 
     def __post_init__(self) -> None:
         n = len(self.positions)
@@ -157,11 +159,11 @@ class Grains:
                 raise ValueError(f"Grains.{name}: must have shape {expected}, got {np.shape(array)}")
             bad = np.flatnonzero(~np.isfinite(array).reshape(n, -1).all(axis=1))
             if bad.size:
-                raise ValueError(f"Grains.{name}: must be finite, grains {bad[:5].tolist()} are not")
+                raise ValueError(f"Grains.{name}: must be finite, got others for grains {bad[:5].tolist()}")
         for name in ("sizes", "densities"):
             bad = np.flatnonzero(np.asarray(getattr(self, name)) <= 0)
             if bad.size:
-                raise ValueError(f"Grains.{name}: must be positive, grains {bad[:5].tolist()} are not")
+                raise ValueError(f"Grains.{name}: must be positive, got others for grains {bad[:5].tolist()}")
 
     @property
     def count(self) -> int:
@@ -171,70 +173,59 @@ class Grains:
 
 @dataclass(frozen=True, eq=False)
 class WorldSetup:
-    """One world before its first step."""
+    """Initial state and parameters of one world."""
 
     grains: Grains
     shapes: tuple[ClumpShape, ...]
-    """The shapes that the grains' `shapes` index."""
+    """Shapes indexed by `Grains.shapes`."""
     contacts: tuple[ContactCoefficients, ...]
-    """Grain against grain first, then one for each kind of wall surface."""
+    """Contact of grain with grain, then one for each kind of wall surface."""
     walls: tuple[tuple[Wall, int], ...]
-    """Each wall with the index into `contacts` that holds for it."""
-    time_step: float
-    """[s]."""
-    skin: float
-    """Pairs of spheres nearer than this are listed as neighbours [m]."""
-    speed_limit: float
-    """A world with a faster grain has diverged [m/s]."""
+    """Each wall with the index of its contact in `contacts`."""
+    time_step: Annotated[float, Parameter("s", above=0.0)]
+    skin: Annotated[float, Parameter("m", above=0.0)]
+    """Largest distance of two spheres that are listed as neighbours."""
+    speed_limit: Annotated[float, Parameter("m/s", above=0.0)]
+    """Speed of a grain above which the world has diverged."""
     domain: tuple[tuple[float, float, float], tuple[float, float, float]]
-    """Corners of the box that grains may be in [m]."""
+    """Corners of the box for grains [m]."""
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
-    """[m/s2]."""
-    air_drag: float = 0.0
-    """Rate at which the air takes a grain's velocity, whatever its size [1/s]."""
+    """Gravity [m/s2]."""
+    air_drag: Annotated[float, Parameter("1/s", at_least=0.0)] = 0.0
+    """Rate at which the air slows a grain of any size."""
     rolling_holds: bool = True
-    """Lets rolling resistance stop a spin at most, and never reverse it."""
+    """True if rolling resistance stops a spin and never reverses it."""
     forms: LawForms = BASE_FORMS
     """Forms of the contact law."""
-    weighed: int | None = None
+    weighed: Annotated[int | None, Parameter("1", at_least=0)] = None
     """Number of the wall whose impulse is summed up in every step (`Solver.impulses`)."""
 
     def __post_init__(self) -> None:
-        for name in ("time_step", "skin", "speed_limit"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"WorldSetup.{name}: must be positive and finite, got {value!r}")
-        if not (np.isfinite(self.air_drag) and self.air_drag >= 0):
-            raise ValueError(
-                f"WorldSetup.air_drag: must be finite and 0 or more [1/s], got {self.air_drag!r}"
-            )
+        check_parameters(self)
         if not np.all(np.subtract(self.domain[1], self.domain[0]) > 0):
-            raise ValueError(f"WorldSetup.domain: lower corner must lie below the upper, got {self.domain!r}")
+            raise ValueError(f"WorldSetup.domain: lower corner must be below the upper, got {self.domain!r}")
         check_forms(self.mechanisms, self.forms)
-        for wall, pair in self.walls:
-            if not 1 <= pair < len(self.contacts):
-                raise ValueError(
-                    f"WorldSetup.walls: must name a contact from 1 to {len(self.contacts) - 1}, got {pair} "
-                    f"for {wall!r}"
-                )
-        if self.weighed is not None and not 0 <= self.weighed < len(self.walls):
-            rule = f"must number a wall, 0 to {len(self.walls) - 1}"
+        last = len(self.contacts) - 1
+        if bad := [contact for _, contact in self.walls if not 1 <= contact <= last]:
+            raise ValueError(f"WorldSetup.walls: each must have a contact from 1 to {last}, got {bad[0]}")
+        if self.weighed is not None and self.weighed >= len(self.walls):
+            rule = f"must be the number of a wall, 0 to {len(self.walls) - 1}"
             raise ValueError(f"WorldSetup.weighed: {rule}, got {self.weighed!r}")
         spheres = max(shape.sphere_count for shape in self.shapes)
         if spheres > MAX_SPHERES_PER_GRAIN:
-            raise ValueError(f"ClumpShape: at most {MAX_SPHERES_PER_GRAIN} spheres a grain, got {spheres}")
+            rule = f"each must have at most {MAX_SPHERES_PER_GRAIN} spheres"
+            raise ValueError(f"WorldSetup.shapes: {rule}, got {spheres}")
         partners = spheres * self.grains.count + len(self.walls) + self.triangle_count
         if partners > (most := max_partners(spheres)):
-            raise ValueError(
-                f"WorldSetup.grains: at most {most} spheres, walls and triangles, got {partners}"
-            )
+            rule = f"must have at most {most} spheres, walls and triangles"
+            raise ValueError(f"WorldSetup: {rule}, got {partners}")
 
     @property
     def force_rate(self) -> float:
-        """Counts that a force on the weighed wall is summed up in [1/N]: about 2**30 to the grains' weight.
+        """Counts of the summed forces on the weighed wall [1/N]: a power of two, about 2**30 for all grains.
 
-        A power of two. Single forces are then good to 1e-5 of a small grain's weight among 1e4, and 64 bits
-        hold the sum of all over 1e9 steps.
+        Single forces then have an error of 1e-5 of a small grain's weight among 1e4, and 64 bits hold the sum
+        over 1e9 steps.
         """
         weight = float(self.masses.sum()) * GRAVITY
         return float(2.0 ** math.floor(math.log2(2.0**30 / weight)))
@@ -247,12 +238,12 @@ class WorldSetup:
 
     @property
     def triangle_count(self) -> int:
-        """Triangles of all its meshes."""
+        """Triangles of all meshes."""
         return sum(wall.triangle_count for wall, _ in self.walls)
 
     @property
     def mechanisms(self) -> Mechanisms:
-        """Kinds of mechanism that some contact of the world has, in the order of the library."""
+        """Kinds of mechanism in the contacts, in the order of the library."""
         present = {type(mechanism) for contact in self.contacts for mechanism in contact.mechanisms}
         return tuple(kind for kind in MECHANISMS.values() if kind in present)
 
@@ -285,7 +276,7 @@ class WorldSetup:
 
     @property
     def origin(self) -> np.ndarray:
-        """Centre of the domain, where fixed-point positions count from [m]."""
+        """Centre of the domain, the origin of fixed-point positions [m]."""
         return np.mean(self.domain, axis=0)
 
     @property
@@ -295,10 +286,10 @@ class WorldSetup:
 
     @property
     def length_unit(self) -> float:
-        """Count of a fixed-point position [m]: a power of two; 31 bits span the domain and a margin."""
+        """Unit of fixed-point positions [m]: a power of two; 31 bits span the domain and a margin."""
         return float(2.0 ** np.ceil(np.log2(1.05 * self.half_extent.max() / 2**31)))
 
 
 def shape_table(worlds: Sequence[WorldSetup]) -> list[ClumpShape]:
-    """Every different shape of the worlds, in order of first appearance."""
+    """Return every different shape of the worlds, in order of first appearance."""
     return list(dict.fromkeys(shape for world in worlds for shape in world.shapes))

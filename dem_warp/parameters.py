@@ -1,13 +1,13 @@
-"""Parameters that a person sets: numbers that know their unit and their bounds.
+"""Parameters that a person sets: numbers with unit and bounds.
 
 A scene or a law states both once, in the type of a field: ``Annotated[float, Parameter("m", above=0.0)]``.
-The object checks itself by them, and whatever reads the parameter from a file takes them from here.
+The object checks itself by them, and readers of files take them from here.
 """
 
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 UNITS = (
     "1", "m", "m^3", "s", "1/s", "Hz", "m/s", "kg", "kg/s", "kg/m^3", "N", "N/m", "Pa", "J/m^2", "J/m^3",
@@ -17,13 +17,12 @@ UNITS = (
 
 
 LATER = {"later": True}
-"""Metadata of a field that came after cases had keys: at its default a case does not tell of it, so that its
-key stays."""
+"""Metadata of a field added after cases had keys: at its default it is not in the key, which stays valid."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """Unit and bounds of a number, which is finite in any case.
+    """Unit and bounds of a finite number.
 
     Raises
     ------
@@ -32,20 +31,20 @@ class Parameter:
     """
 
     unit: str
-    """Its SI unit, as ``"kg/m^3"``; ``"1"``: none."""
+    """SI unit, e.g. ``"kg/m^3"``; ``"1"`` for a number without unit."""
     above: float | None = None
     at_least: float | None = None
     below: float | None = None
     at_most: float | None = None
 
     def __post_init__(self) -> None:
-        if self.unit not in UNITS:
-            raise ValueError(f"Parameter.unit: must be one of {', '.join(UNITS)}, got {self.unit!r}")
+        require_choice("Parameter.unit", self.unit, UNITS)
 
-    def breach(self, value: float) -> str:
-        """Rule that a value breaks, with the unit; empty where it breaks none."""
-        unit = "" if self.unit == "1" else f" [{self.unit}]"
-        return f"must be {rule}{unit}" if (rule := self._broken(value)) else ""
+    def check(self, place: str, value: float) -> None:
+        """Raise ValueError with the place and the rule that a value breaks, if any."""
+        if rule := self._broken(value):
+            unit = "" if self.unit == "1" else f" [{self.unit}]"
+            raise ValueError(f"{place}: must be {rule}{unit}, got {value!r}")
 
     def _broken(self, value: float) -> str:
         if self.above is not None and not self.above < value < math.inf:
@@ -65,7 +64,7 @@ class Parameter:
 
 @cache
 def parameters_of(kind: type) -> dict[str, Parameter]:
-    """Parameters of a dataclass by name, in the order of its fields.
+    """Return the parameters of a dataclass by name, in the order of its fields.
 
     Raises
     ------
@@ -80,15 +79,30 @@ def parameters_of(kind: type) -> dict[str, Parameter]:
     return {name: mark for name, mark in marks if isinstance(mark, Parameter)}
 
 
+@cache
+def choices_of(kind: type) -> dict[str, tuple[Any, ...]]:
+    """Return the values that each field with named choices (Literal) may have, by field."""
+    hints = get_type_hints(kind)
+    return {name: get_args(hint) for name, hint in hints.items() if get_origin(hint) is Literal}
+
+
 def check_parameters(instance: object) -> None:
-    """Check every parameter of a dataclass; one that may be left out may be None.
+    """Check every parameter and every named choice of a dataclass; None passes where a parameter is optional.
 
     Raises
     ------
     ValueError
         With class and field, the rule and the value received.
     """
-    for name, parameter in parameters_of(type(instance)).items():  # type: ignore[arg-type]
-        value = getattr(instance, name)
-        if value is not None and (rule := parameter.breach(value)):
-            raise ValueError(f"{type(instance).__name__}.{name}: {rule}, got {value!r}")
+    kind: Any = type(instance)
+    for name, known in choices_of(kind).items():
+        require_choice(f"{kind.__name__}.{name}", getattr(instance, name), known)
+    for name, parameter in parameters_of(kind).items():
+        if (value := getattr(instance, name)) is not None:
+            parameter.check(f"{kind.__name__}.{name}", value)
+
+
+def require_choice(place: str, value: Any, known: tuple[Any, ...]) -> None:
+    """Raise ValueError with the place unless a value is one of the known ones."""
+    if value not in known:
+        raise ValueError(f"{place}: must be one of {', '.join(map(str, known))}, got {value!r}")

@@ -1,4 +1,4 @@
-"""The grains of a case: their shapes, their material and their sizes, and how they are drawn from a seed."""
+"""The grains of a case: shapes, material and sizes, drawn from a seed."""
 
 from __future__ import annotations
 
@@ -11,21 +11,27 @@ import numpy as np
 
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Material
-from dem_warp.parameters import LATER
+from dem_warp.parameters import LATER, Parameter
 
 SIZE_LIMIT = 3.0
-"""Sizes are drawn within this many standard deviations of their mean."""
+"""Truncation of the normal distribution of sizes, in standard deviations."""
 
 SIZE_VARIANCE = 1.0 - 2.0 * SIZE_LIMIT * math.exp(-0.5 * SIZE_LIMIT**2) / (
     math.sqrt(2.0 * math.pi) * math.erf(SIZE_LIMIT / math.sqrt(2.0))
 )
-"""Variance of a standard normal variable that is cut at SIZE_LIMIT."""
+"""Variance of a standard normal variable truncated at SIZE_LIMIT."""
 
 FRACTION_TOLERANCE = 1e-6
-"""Fractions add up to 1 within this, so that decimals may be rounded."""
+"""Largest difference of the sum of fractions from 1, for rounded decimals."""
 
 _SIZES, _SHAPES = 0, 2
-"""Streams of random numbers of a seed; 1 is that of the orientations."""
+"""Random streams of a seed; 1 is for the orientations."""
+
+
+def _check_sum(place: str, fractions: tuple[float, ...]) -> None:
+    total = sum(fractions)
+    if not math.isclose(total, 1.0, rel_tol=0.0, abs_tol=FRACTION_TOLERANCE):
+        raise ValueError(f"{place}: must add up to 1, got {fractions!r}, together {total:g}")
 
 
 @dataclass(frozen=True)
@@ -35,85 +41,73 @@ class ShapeMixture:
     Raises
     ------
     ValueError
-        If there is no shape, or the fractions break their rule.
+        If there is no shape, or a fraction is wrong.
     """
 
     shapes: tuple[ClumpShape, ...]
     fractions: tuple[float, ...]
-    """Part of the number of grains that has each shape; 0 or more, together 1. The shape of every grain
-    is drawn by itself, so that the counts of a world are multinomial."""
+    """Part of the number of grains with each shape; 0 or more, together 1. The shape of every grain is drawn
+    independently: the counts of a world are multinomial."""
 
     def __post_init__(self) -> None:
         if not self.shapes:
             raise ValueError("ShapeMixture.shapes: must hold at least one shape, got none")
         if len(self.fractions) != len(self.shapes):
-            raise ValueError(
-                f"ShapeMixture.fractions: must be one for each of {len(self.shapes)} shapes, got "
-                f"{len(self.fractions)}"
-            )
+            rule = f"must be one for each of {len(self.shapes)} shapes"
+            raise ValueError(f"ShapeMixture.fractions: {rule}, got {len(self.fractions)}")
         for index, fraction in enumerate(self.fractions):
-            if not (math.isfinite(fraction) and fraction >= 0.0):
-                raise ValueError(
-                    f"ShapeMixture.fractions[{index}]: must be finite and at least 0, got {fraction!r}"
-                )
-        if not math.isclose(sum(self.fractions), 1.0, rel_tol=0.0, abs_tol=FRACTION_TOLERANCE):
-            raise ValueError(
-                f"ShapeMixture.fractions: must add up to 1, got {self.fractions!r}, together "
-                f"{sum(self.fractions):g}"
-            )
+            Parameter("1", at_least=0.0).check(f"ShapeMixture.fractions[{index}]", fraction)
+        _check_sum("ShapeMixture.fractions", self.fractions)
 
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
-"""Step of the sequence that classes are drawn by: of all numbers the worst to come near with fractions."""
+"""Step of the sequence that classes are drawn with: the number worst approximated by fractions."""
 
 MIXED = 16
-"""Grains of a drawn order that change places, so that neighbours in the rain are strangers."""
+"""Grains of the drawn order that are shuffled, so that neighbours in the rain are independent."""
 
 CHANGES, STRAY = 4, 1.5
-"""Grains among them that change their class, at most, and grains by which a class may miss its share then."""
+"""Most grains among them that change their class, and largest difference of a class from its share then."""
 
 
 @dataclass(frozen=True)
 class SizeClasses:
-    """Sizes that occur, each with its part of the number of grains.
+    """Discrete sizes, each with its part of the number of grains.
 
     Raises
     ------
     ValueError
-        If the sizes do not rise, or the fractions do not add up.
+        If the sizes do not increase, or a fraction is wrong.
     """
 
     sizes: tuple[float, ...]
-    """Scales of the shape, rising."""
+    """Scales of the shape, increasing."""
     fractions: tuple[float, ...]
-    """Part of the number of grains of each; positive, together 1."""
+    """Part of the number of grains with each size; positive, together 1."""
 
     def __post_init__(self) -> None:
         if not self.sizes or len(self.sizes) != len(self.fractions):
+            rule = f"must be one for each of {len(self.sizes)} sizes"
+            raise ValueError(f"SizeClasses.fractions: {rule}, got {len(self.fractions)}")
+        increasing = all(a < b for a, b in pairwise((0.0, *self.sizes)))
+        if not (increasing and math.isfinite(self.sizes[-1])):
             raise ValueError(
-                f"SizeClasses.fractions: must be one for each size, got {len(self.fractions)} for "
-                f"{len(self.sizes)}"
+                f"SizeClasses.sizes: must be positive, finite and increasing, got {self.sizes!r}"
             )
-        rising = all(a < b for a, b in pairwise((0.0, *self.sizes)))
-        if not (rising and math.isfinite(self.sizes[-1])):
-            raise ValueError(f"SizeClasses.sizes: must be positive, finite and rise, got {self.sizes!r}")
-        total = sum(self.fractions)
-        if not (min(self.fractions) > 0.0 and math.isclose(total, 1.0, abs_tol=FRACTION_TOLERANCE)):
-            raise ValueError(
-                f"SizeClasses.fractions: must be positive and add up to 1, got {self.fractions!r}"
-            )
+        if not min(self.fractions) > 0.0:
+            raise ValueError(f"SizeClasses.fractions: must be positive, got {self.fractions!r}")
+        _check_sum("SizeClasses.fractions", self.fractions)
 
     def moment(self, power: int) -> float:
-        """Mean of a power of the size over the number of grains."""
+        """Return the mean of a power of the size over the number of grains."""
         return float(np.dot(self.fractions, np.power(self.sizes, power)))
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Draw the sizes of `count` grains, (count,).
 
         The sequence n golden mod 1, from a random start, has the lowest discrepancy of its kind. After each
-        MIXED grains a few of them change their class, so that all so far have the mean mass, and every class
-        its share within STRAY grains. So a world of few grains keeps the mean mass, and so does a container
-        that takes the first of them.
+        MIXED grains some change their class, so that all so far have the mean mass and every class has its
+        share within STRAY grains: the mean mass holds for few grains and for the first ones.
 
         References
         ----------
@@ -133,7 +127,7 @@ class SizeClasses:
 
 
 def _balanced(some: np.ndarray, counts: np.ndarray, masses: np.ndarray, fractions: np.ndarray) -> np.ndarray:
-    """Change classes of the last grains, in place, until all so far have the mean mass; the new counts."""
+    """Change classes of the last grains, in place, until all have the mean mass; return the new counts."""
     for _ in range(CHANGES):
         ahead = counts - counts.sum() * fractions
         excess = counts @ masses - counts.sum()
@@ -150,13 +144,13 @@ def _balanced(some: np.ndarray, counts: np.ndarray, masses: np.ndarray, fraction
 
 @dataclass(frozen=True, eq=False)
 class DrawnGrains:
-    """Grains drawn from a population, before they have a place."""
+    """Grains drawn from a population, without places."""
 
     clumps: tuple[ClumpShape, ...]
     shapes: np.ndarray
     """Index of each grain's shape into `clumps`, shape (n,)."""
     sizes: np.ndarray
-    """Scale of the shape, shape (n,)."""
+    """Scale of each grain's shape, shape (n,)."""
 
     @property
     def count(self) -> int:
@@ -170,41 +164,39 @@ class DrawnGrains:
 
 
 def size_of_mean_mass(size: float, size_sd: float) -> float:
-    """Mean of the sizes whose spread leaves the mean mass at that of a grain of one size.
+    """Return the mean of sizes with a spread whose mean mass is that of a grain of `size`.
 
-    The mass goes as the cube of the size, whose mean over a distribution symmetric about m, of variance v, is
-    m^3 + 3 m v; this is Cardano's real root of m^3 + 3 m v = size^3.
-
-    Parameters
-    ----------
-    size
-        The size that has the mean mass, positive.
-    size_sd
-        Standard deviation of the sizes before they are cut.
+    `size_sd` is the standard deviation before the truncation. The mean of the cube over a symmetric
+    distribution of mean m and variance v is m^3 + 3 m v; this is Cardano's real root of m^3 + 3 m v = size^3.
     """
     variance, half = SIZE_VARIANCE * size_sd**2, 0.5 * size**3
     root = math.cbrt(half + math.sqrt(half**2 + variance**3))
     return root - variance / root
 
 
+def _mean_and_sd(classes: SizeClasses) -> tuple[float, float]:
+    mean = classes.moment(1)
+    return mean, math.sqrt(max(classes.moment(2) - mean**2, 0.0))
+
+
 @dataclass(frozen=True)
 class GrainPopulation:
-    """Grains of one material whose sizes, and shapes where there are several, vary.
+    """Grains of one material with varying sizes and shapes.
 
     Raises
     ------
     ValueError
-        If a size leaves its range.
+        If a size is out of its range.
     """
 
     shape: ClumpShape | ShapeMixture
     material: Material
     size_mean: float = 1.0
     size_sd: float = 0.05
-    """Of the normal distribution of the factor that scales a grain's shape, the same for every shape;
-    truncated at +-3 standard deviations."""
+    """Mean and standard deviation of the normal distribution of the scale of the shape, the same for every
+    shape, truncated at 3 standard deviations."""
     classes: SizeClasses | None = field(default=None, metadata=LATER)
-    """Sizes that were measured, instead of a normal distribution: mean and standard deviation are theirs."""
+    """Measured sizes instead of the normal distribution; mean and standard deviation must be theirs."""
 
     def __post_init__(self) -> None:
         if self.classes is not None:
@@ -213,31 +205,25 @@ class GrainPopulation:
         if not self.size_mean > 0:
             raise ValueError(f"GrainPopulation.size_mean: must be positive, got {self.size_mean!r}")
         if not 0 <= SIZE_LIMIT * self.size_sd < self.size_mean:
-            raise ValueError(
-                f"GrainPopulation.size_sd: must be at least 0 and below size_mean / {SIZE_LIMIT:g}, "
-                f"got {self.size_sd!r}"
-            )
+            rule = f"must be at least 0 and below size_mean / {SIZE_LIMIT:g}"
+            raise ValueError(f"GrainPopulation.size_sd: {rule}, got {self.size_sd!r}")
 
     def _check_classes(self, classes: SizeClasses) -> None:
-        mean = classes.moment(1)
-        spread = math.sqrt(max(classes.moment(2) - mean**2, 0.0))
-        for name, its in (("size_mean", mean), ("size_sd", spread)):
+        for name, its in zip(("size_mean", "size_sd"), _mean_and_sd(classes), strict=True):
             if not math.isclose(getattr(self, name), its, rel_tol=1e-9, abs_tol=1e-9):
-                rule = f"must be that of its classes, {its:.9g}"
+                rule = f"must be that of the classes, {its:.9g}"
                 raise ValueError(f"GrainPopulation.{name}: {rule}, got {getattr(self, name)!r}")
 
     @classmethod
     def of_classes(
         cls, shape: ClumpShape | ShapeMixture, material: Material, classes: SizeClasses
     ) -> GrainPopulation:
-        """Build a population of classes of size."""
-        mean = classes.moment(1)
-        spread = math.sqrt(max(classes.moment(2) - mean**2, 0.0))
-        return cls(shape, material, mean, spread, classes)
+        """Build a population of size classes."""
+        return cls(shape, material, *_mean_and_sd(classes), classes)
 
     @property
     def size_range(self) -> tuple[float, float]:
-        """Smallest and largest size that the population may hold."""
+        """Smallest and largest possible size."""
         if self.classes is not None:
             return self.classes.sizes[0], self.classes.sizes[-1]
         reach = SIZE_LIMIT * self.size_sd
@@ -245,7 +231,7 @@ class GrainPopulation:
 
     @property
     def mixture(self) -> ShapeMixture:
-        """The shapes that occur, and their fractions: a shape of fraction 0 is as good as absent."""
+        """Shapes with a fraction above 0, and their fractions."""
         if isinstance(self.shape, ClumpShape):
             return ShapeMixture((self.shape,), (1.0,))
         present = [i for i, fraction in enumerate(self.shape.fractions) if fraction > 0.0]
@@ -255,23 +241,23 @@ class GrainPopulation:
 
     @property
     def sphere_count(self) -> int:
-        """Number of spheres of the shape that has most."""
+        """Largest number of spheres of a shape."""
         return max(shape.sphere_count for shape in self.mixture.shapes)
 
     @property
     def smallest_sphere(self) -> float:
-        """Smallest sphere radius that the population may hold [m]."""
+        """Smallest possible sphere radius [m]."""
         smallest = min(float(shape.radii.min()) for shape in self.mixture.shapes)
         return smallest * self.size_range[0]
 
     def mean(self, quantity: Callable[[ClumpShape], float]) -> float:
-        """Mean of a quantity of the shapes over the number of grains, at size 1."""
+        """Return the mean of a quantity of the shapes over the number of grains, at size 1."""
         mixture = self.mixture
         return float(np.dot(mixture.fractions, [quantity(shape) for shape in mixture.shapes]))
 
     @property
     def grain_reach(self) -> float:
-        """Bounding radius of a typical grain [m]: the mean over the volume of solid, at size 1."""
+        """Bounding radius of a typical grain [m]: the mean over the solid volume, at size 1."""
         volume = self.mean(lambda shape: shape.volume)
         return self.mean(lambda shape: shape.volume / volume * shape.bounding_radius)
 
@@ -284,12 +270,12 @@ class GrainPopulation:
         )
 
     def draw_shapes(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Shapes of `count` grains as indices into the mixture's, (count,)."""
+        """Draw the shapes of `count` grains as indices into the mixture's, (count,)."""
         below = np.cumsum(self.mixture.fractions)
         return np.searchsorted(below / below[-1], rng.random(count), side="right")
 
     def draw_sizes(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Sizes of `count` grains, (count,)."""
+        """Draw the sizes of `count` grains, (count,)."""
         if self.classes is not None:
             return self.classes.draw(count, rng)
         sizes = rng.normal(size=count)

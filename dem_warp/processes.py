@@ -1,4 +1,4 @@
-"""Cases spread over processes on a CPU: one world a task, as Warp's CPU kernels use one thread."""
+"""Cases in processes on a CPU: one world per task, as Warp's CPU kernels use one thread."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
-from dem_warp.batch import Onlooker, begin
+from dem_warp.batch import OnAdvance, begin
 from dem_warp.case import Case
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
@@ -24,22 +24,22 @@ REPORT_EVERY = 0.5
 """Time between two reports of progress [s]."""
 
 PHASE_LENGTH = 16
-"""Characters of a phase's name that travel between processes."""
+"""Characters of a phase's name in a process's state."""
 
 NO_CASE = -1
-"""Index of the case of a process that has none."""
+"""Index of the case of an idle process."""
 
 LOSSES = 3
-"""Processes that are lost in a row, with no case ended between, before a call is given up."""
+"""Losses of processes in a row, without an ended case, after which a call fails."""
 
 Report = Callable[[Sequence[float], Sequence[str]], None]
-"""Takes the fraction done and the phase of every case."""
+"""Callback with the fraction done and the phase of every case."""
 
 _log = logging.getLogger(__name__)
 
 
 class _Process(SpawnProcess):
-    """A process that simulates, told from others that a program may have."""
+    """A simulating process; a subclass, so that it can be recognised."""
 
 
 class _Context(SpawnContext):
@@ -47,13 +47,13 @@ class _Context(SpawnContext):
 
 
 _CONTEXT = _Context()
-"""Start of processes: one that has read a GPU's state must not be forked."""
+"""Start method of processes: a process with a GPU context must not be forked."""
 
 
-class _Stand(ctypes.Structure):
+class _State(ctypes.Structure):
     """State of a process, which its parent reads at any time.
 
-    No lock guards it: a process that is killed would keep it. So what is read may be half of it old.
+    It has no lock, as a killed process would keep it; so a part of what is read may be old.
     """
 
     _fields_ = (
@@ -63,26 +63,26 @@ class _Stand(ctypes.Structure):
     )
 
     def put(self, case: int, fraction: float, phase: str) -> None:
-        """Tell of a case how far it is."""
+        """Set case, fraction done and phase."""
         self.fraction, self.phase, self.case = fraction, phase.encode()[:PHASE_LENGTH], case
 
 
-_own: list[_Stand] = []
-"""State of this process, which it tells its parent."""
+_own: list[_State] = []
+"""State of this process, shared with its parent."""
 
 
-def _start(stands: Any, started: Any) -> None:
+def _start(states: Any, started: Any) -> None:
     """Begin a process: its parent ends it, not Ctrl-C, which reaches every process of a terminal."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
     with started.get_lock():
         number = started.value
         started.value += 1
-    _own.append(stands[number])
+    _own.append(states[number])
 
 
 def end_with_parent() -> None:
-    """Let this process end when its parent is gone: a parent that was killed cannot tell its workers."""
+    """Let this process end with its parent, even if the parent is killed."""
     threading.Thread(target=_wait_for_parent, daemon=True).start()
 
 
@@ -93,10 +93,10 @@ def _wait_for_parent() -> None:
 
 
 def _run_case(
-    index: int, case: Case, checkpoints: Checkpoints | None, onlooker: Onlooker | None
+    index: int, case: Case, checkpoints: Checkpoints | None, on_advance: OnAdvance | None
 ) -> CaseResult:
-    """Run one case in a process, which tells how far it is."""
-    batch, _, refused = begin([case], resolve_device("cpu"), checkpoints, onlooker)
+    """Run one case in a process, with its progress in the shared state."""
+    batch, _, refused = begin([case], resolve_device("cpu"), checkpoints, on_advance)
     if batch is None:
         return refused[0]
     try:
@@ -108,7 +108,7 @@ def _run_case(
 
 
 def _gather(futures: dict[Future[CaseResult], int], keep: OnResult, look: Callable[[], None]) -> list[int]:
-    """Take results as they are had, and look now and then; return those cases that were lost."""
+    """Pass on results, call `look` regularly, and return the cases of lost processes."""
     lost, pending = [], set(futures)
     while pending:
         finished, pending = wait(pending, REPORT_EVERY, FIRST_COMPLETED)
@@ -122,14 +122,14 @@ def _gather(futures: dict[Future[CaseResult], int], keep: OnResult, look: Callab
 
 
 class Processes:
-    """Processes that simulate cases on a CPU, for one call of `simulate` after another.
+    """Processes that simulate cases on a CPU, for several calls of `simulate`.
 
-    They start with the first cases, and stay until the block of a ``with`` ends.
+    They start with the first cases and end with the ``with`` block.
 
     Parameters
     ----------
     count : int
-        Cases that are simulated at once.
+        Number of processes.
 
     Examples
     --------
@@ -141,10 +141,10 @@ class Processes:
     def __init__(self, count: int) -> None:
         self.count = count
         self._pool: ProcessPoolExecutor | None = None
-        self._stands: Any = None
+        self._states: Any = None
 
     def __enter__(self) -> Processes:
-        """Return these processes, which start later."""
+        """Return self; the processes start later."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -157,26 +157,21 @@ class Processes:
         on_result: OnResult,
         report: Report,
         checkpoints: Checkpoints | None = None,
-        onlooker: Onlooker | None = None,
+        on_advance: OnAdvance | None = None,
     ) -> None:
-        """Run cases, `count` at a time; those of a process that is lost go on in another one.
+        """Run cases, `count` at a time; the cases of a lost process continue in another one.
 
         Parameters
         ----------
-        cases : sequence of Case
-        on_result : callable
-            Called with index and result of each case as it ends.
+        cases, on_result, checkpoints, on_advance
+            As in `simulate`.
         report : callable
-            Called now and then with the fraction done and the phase of every case.
-        checkpoints : Checkpoints, optional
-            Where the processes save their cases and take them up.
-        onlooker : Onlooker, optional
-            Sees the batch of each case, in its process.
+            Called regularly with the fraction done and the phase of every case.
 
         Raises
         ------
         concurrent.futures.process.BrokenProcessPool
-            When processes are lost again and again, with no case ended between.
+            When processes are lost LOSSES times without an ended case.
         """
         fractions, phases = [0.0] * len(cases), ["waiting"] * len(cases)
 
@@ -191,49 +186,49 @@ class Processes:
         left, losses = list(range(len(cases))), 0
         try:
             while left:
-                futures = {self._submit(i, cases[i], checkpoints, onlooker): i for i in left}
+                futures = {self._submit(i, cases[i], checkpoints, on_advance): i for i in left}
                 lost = _gather(futures, keep, look)
                 losses = losses + 1 if len(lost) == len(left) else 0
                 if losses == LOSSES:
-                    raise BrokenProcessPool("processes are lost again and again")
+                    raise BrokenProcessPool("processes were lost repeatedly; they may need more memory")
                 if lost:
-                    _log.warning("a process was lost: its cases, and those that waited, go on in others")
+                    _log.warning("a process was lost: its cases and the waiting ones continue in others")
                 left = lost
         except BaseException:
-            self._give_up()
+            self._terminate()
             raise
 
     def end(self) -> None:
-        """End the processes, none of which has a case."""
+        """End the idle processes."""
         if pool := self._pool:
             self._pool = None
             pool.shutdown()
 
     def _started(self) -> ProcessPoolExecutor:
         if self._pool is None:
-            self._stands = _CONTEXT.RawArray(_Stand, [(NO_CASE, 0.0, b"")] * self.count)
-            begun = (self._stands, _CONTEXT.Value("i", 0))
+            self._states = _CONTEXT.RawArray(_State, [(NO_CASE, 0.0, b"")] * self.count)
+            begun = (self._states, _CONTEXT.Value("i", 0))
             self._pool = ProcessPoolExecutor(self.count, _CONTEXT, _start, begun)
         return self._pool
 
     def _submit(
-        self, index: int, case: Case, checkpoints: Checkpoints | None, onlooker: Onlooker | None
+        self, index: int, case: Case, checkpoints: Checkpoints | None, on_advance: OnAdvance | None
     ) -> Future[CaseResult]:
-        """Give a case to the processes, or to new ones where one of them was lost."""
+        """Submit a case, to new processes if one was lost."""
         try:
-            return self._started().submit(_run_case, index, case, checkpoints, onlooker)
+            return self._started().submit(_run_case, index, case, checkpoints, on_advance)
         except BrokenProcessPool:
-            self._give_up()
-            return self._started().submit(_run_case, index, case, checkpoints, onlooker)
+            self._terminate()
+            return self._started().submit(_run_case, index, case, checkpoints, on_advance)
 
     def _read(self, fractions: list[float], phases: list[str]) -> None:
-        """Read how far the running cases are."""
-        for stand in self._stands:
-            if stand.case != NO_CASE:
-                fractions[stand.case], phases[stand.case] = stand.fraction, stand.phase.decode()
+        """Read the progress of the running cases."""
+        for state in self._states:
+            if state.case != NO_CASE:
+                fractions[state.case], phases[state.case] = state.fraction, state.phase.decode()
 
-    def _give_up(self) -> None:
-        """End the processes, whatever they are at."""
+    def _terminate(self) -> None:
+        """End the processes, with or without a case."""
         if pool := self._pool:
             self._pool = None
             pool.shutdown(wait=False, cancel_futures=True)

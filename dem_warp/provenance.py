@@ -15,19 +15,20 @@ from dem_warp.version import __version__, source_commit
 
 PACKAGE = "dem_warp"
 
+CHANGE_NO_HEAP = ("dem_warp/provenance.py", "dem_warp/registry.py", "dem_warp/version.py")
+"""Imported files that the fingerprint leaves out."""
+
 
 def engine_fingerprint(*parts: Any) -> str:
-    """Hash of what the engine's code means, and of the version of Warp that compiles it.
+    """Return the hash of all code that can change a heap, and of the version of Warp.
+
+    It covers batches, laws, scenes and everything that these import, by file name and syntax tree: comments,
+    docstrings and formatting do not count.
 
     Parameters
     ----------
     parts : types or functions
-        Laws, scenes and whatever else takes part. The packages of those from outside are hashed too.
-
-    Notes
-    -----
-    Comments, docstrings and the form of the text do not count, so that a corrected comment leaves stored
-    cases valid; names of files do.
+        Laws and scenes in use. The packages of those outside dem_warp are hashed too.
     """
     outside = {part.__module__ for part in parts if _top(part.__module__) != PACKAGE}
     return _fingerprint(tuple(sorted(outside)))
@@ -36,14 +37,41 @@ def engine_fingerprint(*parts: Any) -> str:
 @functools.cache
 def _fingerprint(modules: tuple[str, ...]) -> str:
     digest = hashlib.sha256(importlib.metadata.version("warp-lang").encode())
-    for module in (PACKAGE, *modules):
-        for name, path in _files(module):
-            digest.update(f"\n{name}\n{source_meaning(path.read_text(encoding='utf-8'))}".encode())
+    files = [
+        *sorted(engine_files().items()),
+        *(file for module in modules for file in _package_files(module)),
+    ]
+    for name, path in files:
+        digest.update(f"\n{name}\n{source_meaning(path.read_text(encoding='utf-8'))}".encode())
     return digest.hexdigest()
 
 
-def _files(module: str) -> Iterator[tuple[str, Path]]:
-    """Source files of the package that a module belongs to, with their names; a module alone has its own."""
+def engine_files() -> dict[str, Path]:
+    """Return the source files of dem_warp that can change a heap, by name: an import closure."""
+    root = Path(__file__).parent
+    files: dict[str, Path] = {}
+    waiting = [root / "batch.py", *(root / "laws").glob("*.py"), *(root / "scenes").glob("*.py")]
+    while waiting:
+        path = waiting.pop()
+        name = path.relative_to(root.parent).as_posix()
+        if name not in files and name not in CHANGE_NO_HEAP:
+            files[name] = path
+            waiting += _imported_files(path)
+    return files
+
+
+def _imported_files(path: Path) -> Iterator[Path]:
+    """Yield the files of dem_warp that a file imports."""
+    for part in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(part, ast.ImportFrom) and part.module and _top(part.module) == PACKAGE:
+            for module in (part.module, *(f"{part.module}.{alias.name}" for alias in part.names)):
+                file = Path(__file__).parents[1].joinpath(*module.split(".")).with_suffix(".py")
+                if file.is_file():
+                    yield file
+
+
+def _package_files(module: str) -> Iterator[tuple[str, Path]]:
+    """Yield the source files of a module's package with their names; a module without package has its own."""
     package = sys.modules.get(_top(module))
     folders = [Path(folder) for folder in getattr(package, "__path__", ())]
     for folder in folders:
@@ -59,10 +87,9 @@ def _top(module: str) -> str:
 
 
 def source_meaning(text: str) -> str:
-    """Syntax tree of a source as text, without docstrings, comments and line numbers.
+    """Return the syntax tree of a source as text, without docstrings, comments and line numbers.
 
-    It is the same in every version of Python that knows the source's grammar: what is empty is left out, as
-    `ast.dump` does in some of them only.
+    Unlike `ast.dump` it is the same in every version of Python: empty fields are left out.
     """
     return _meaning(ast.parse(text))
 
@@ -77,13 +104,13 @@ def _meaning(part: Any) -> str:
 
 
 def _is_docstring(part: Any) -> bool:
-    """Tell a string that stands as a statement: the docstring of a module, a class, a function or a field."""
+    """Return True for a string that is a statement, as a docstring of a module, class, function or field."""
     string = isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant)
     return string and isinstance(part.value.value, str)
 
 
 def provenance(device: Any, precision: str) -> dict[str, Any]:
-    """Versions, device and precision that make a result, by name."""
+    """Return the versions, device and precision of a result."""
     import warp as wp
 
     return {

@@ -1,4 +1,4 @@
-"""Files that may come from anyone: read whole, and no larger than they may be."""
+"""Reading of untrusted files with limits on their size."""
 
 import io
 import stat
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 LARGEST_TEXT = 10_000_000
-"""Bytes of the longest text file that is read."""
+"""Largest text file that is read [bytes]."""
 
 
 def read_text(path: str | Path, largest: int = LARGEST_TEXT) -> str:
@@ -19,50 +19,45 @@ def read_text(path: str | Path, largest: int = LARGEST_TEXT) -> str:
     OSError
         If it cannot be read.
     ValueError
-        If it is no regular file, has more bytes than the largest, or is no UTF-8.
+        If it is not a regular file, too large, or not UTF-8.
     """
     file = Path(path)
     facts = file.stat()
     if not stat.S_ISREG(facts.st_mode):
-        raise ValueError(f"{path}: must be a regular file, got another kind")
+        raise ValueError(f"{path}: must be a regular file")
     if facts.st_size > largest:
         raise ValueError(f"{path}: must have at most {largest} bytes, got {facts.st_size}")
     return file.read_text(encoding="utf-8")
 
 
 def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    """Read the arrays of an uncompressed .npz file by name; checksums are verified.
+    """Read the arrays of an uncompressed .npz file by name; raise ValueError if it is damaged.
 
-    An archive of this kind holds no more than its own size, so that a small file takes little memory.
-
-    Raises
-    ------
-    ValueError
-        If the file is no such archive, whatever is wrong with it.
+    Without compression a small file needs little memory.
     """
     try:
         if not Path(path).is_file():
-            raise ValueError("no regular file")
+            raise ValueError("it is not a regular file")
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
             if len(members) != _stated_count(path):
-                raise ValueError("it states another number of arrays than it has")
+                raise ValueError("its number of arrays is wrong")
             if any(member.compress_type != zipfile.ZIP_STORED for member in members):
                 raise ValueError("its arrays are compressed")
             return {member.filename.removesuffix(".npy"): _array(archive.read(member)) for member in members}
     except Exception as error:
-        # the libraries raise whatever their parsers happen to meet in a damaged file
-        raise ValueError(f"must be a whole archive of arrays, got one that is not: {error}") from error
+        # the libraries raise errors of many kinds for a damaged file
+        raise ValueError(f"not a valid archive of arrays: {error}") from error
 
 
 def _stated_count(path: str | Path) -> int:
-    """Return the number of members that an archive states at its end, which zipfile does not look at."""
+    """Return the number of members in the archive's end record, which zipfile ignores."""
     end = Path(path).read_bytes()[-22:]
     return int.from_bytes(end[10:12], "little") if end[:4] == b"PK\x05\x06" else -1
 
 
 def _array(content: bytes) -> np.ndarray:
-    """Array of a .npy file, which may name no more elements than it has."""
+    """Return the array of a .npy file, after a check of its size."""
     file = io.BytesIO(content)
     version = np.lib.format.read_magic(file)
     header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}

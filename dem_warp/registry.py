@@ -1,4 +1,4 @@
-"""Registries: laws, scenes and the like by name, those of this tree and those of packages from outside."""
+"""Registries of laws, scenes and the like by name: built-in ones and those of plugins."""
 
 import logging
 from collections import ChainMap
@@ -14,12 +14,12 @@ _log = logging.getLogger(__name__)
 
 
 class Modules(Mapping[str, T], Generic[T]):
-    """Things of this tree by name, each imported when it is first wanted: names alone load nothing.
+    """Lazy mapping of built-in names; a module is imported on first access.
 
     Parameters
     ----------
     places : mapping
-        Module and name of each, as ``"dem_warp.laws.jkr:JKR"``.
+        Module and attribute of each name, e.g. ``"dem_warp.laws.jkr:JKR"``.
     """
 
     def __init__(self, places: Mapping[str, str]) -> None:
@@ -41,25 +41,24 @@ class Modules(Mapping[str, T], Generic[T]):
 
 
 class Registry(Mapping[str, T], Generic[T]):
-    """Built-in things by name, then those that installed packages announce as entry points.
+    """Built-in objects by name, then the entry points of installed packages.
 
-    A package from outside announces what it adds in its pyproject.toml; the name is the entry's own::
+    A package declares an entry point in its pyproject.toml::
 
         [project.entry-points."dem_warp.laws"]
         magnetism = "grain_magnets.law:Magnetism"
 
-    Its entries are loaded when the registry is first looked at, and once. One that cannot be loaded, or that
-    breaks a rule, is left out with a warning; the others stay.
+    Entry points are loaded once, on first access. Invalid ones are skipped with a warning.
 
     Parameters
     ----------
     group : str
-        Group of the entry points, as ``"dem_warp.laws"``.
+        Group of the entry points, e.g. ``"dem_warp.laws"``.
     built_in : mapping
-        Things of this tree by name.
+        Built-in objects by name.
     check : callable
-        Called with name and thing of an entry, and with all that is known before it; raises ValueError or
-        TypeError for one that breaks a rule.
+        Called with name and object of an entry, and with all objects before it; raises ValueError or
+        TypeError for an invalid one.
     """
 
     def __init__(
@@ -72,19 +71,19 @@ class Registry(Mapping[str, T], Generic[T]):
 
     @cached_property
     def _outside(self) -> dict[str, T]:
-        """Entries that packages from outside announce."""
+        """Objects of installed packages by name."""
         outside: dict[str, T] = {}
         known = ChainMap(outside, self._built_in)  # type: ignore[arg-type]
         for entry in sorted(entry_points(group=self._group), key=lambda entry: entry.name):
             try:
                 if entry.name in known:
-                    raise ValueError("the name is taken")
+                    raise ValueError("the name is in use")
                 thing = entry.load()
                 self._check(entry.name, thing, known)
-            except Exception as error:  # whatever a package from outside does at its import
+            except Exception as error:  # an import may raise anything
                 package = entry.dist.name if entry.dist else "unknown"
                 place = f"package {package}, entry {entry.name} = {entry.value} of {self._group}"
-                _log.warning("%s: left out, %s: %s", place, type(error).__name__, error)
+                _log.warning("%s: skipped, %s: %s", place, type(error).__name__, error)
             else:
                 outside[entry.name] = thing
         return outside
@@ -104,14 +103,8 @@ class Registry(Mapping[str, T], Generic[T]):
 
 
 def require_kind(base: type, name: str, thing: object) -> None:
-    """Check that a thing is a kind of another and has the name of its entry.
-
-    Raises
-    ------
-    TypeError, ValueError
-        When it is none, or has another name.
-    """
+    """Raise TypeError or ValueError unless an object is a subclass of a base with the name of its entry."""
     if not (isinstance(thing, type) and issubclass(thing, base)):
         raise TypeError(f"must be a subclass of {base.__name__}, got {thing!r}")
     if (own := getattr(thing, "name", None)) != name:
-        raise ValueError(f"must have the name of its entry, got {own!r}")
+        raise ValueError(f"{thing.__name__}.name: must be {name!r}, the name of the entry, got {own!r}")

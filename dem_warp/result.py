@@ -14,43 +14,42 @@ class Progress:
 
     done: int
     total: int
-    """Cases."""
+    """Number of ended cases, and of all."""
     fraction: float
-    """Share of all work, 0 to 1."""
+    """Fraction of all work done, 0 to 1."""
     phase_counts: dict[str, int]
-    """Cases that have not ended, by phase."""
+    """Number of running cases by phase."""
     seconds: float
     """Wall time so far [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
-    """End of one case."""
+    """Result of one case."""
 
     status: str
-    """"finished", "diverged", "overflow", or "failed"; of another program also "no-answer"."""
+    """"finished", "diverged", "overflow" or "failed"; with another program also "no-answer"."""
     reason: str
-    """Cause of the end, and a remedy; empty when finished."""
+    """Cause of a failure with advice; empty when finished."""
     positions: np.ndarray
     orientations: np.ndarray
-    """Poses of the grains left [m], quaternions x y z w, shape (n, 3) and (n, 4)."""
+    """Positions [m] and orientations (quaternions x y z w) of the remaining grains, (n, 3) and (n, 4)."""
     sizes: np.ndarray
     """Scale of each grain's shape, shape (n,)."""
     shapes: np.ndarray
     """Index of each grain's shape into `clumps`, shape (n,)."""
     clumps: np.ndarray
-    """Local centre and radius of each sphere of each shape [m]; a shape of fewer than S spheres is filled
-    up with radii of 0, which are no spheres, shape (shapes, S, 4)."""
+    """Local centre and radius of each sphere of each shape [m], padded with radii of 0, (shapes, S, 4)."""
     observables: dict[str, float] = field(default_factory=dict)
-    """Those of the scene, in the units that it says, and beside them `rebuilds` of the neighbour lists."""
+    """Observables of the scene, in its units, and `rebuilds` of the neighbour lists."""
     phases: list[dict[str, Any]] = field(default_factory=list)
-    """Name, time [s] and steps of each phase."""
+    """Name, duration [s] and steps of each phase."""
     provenance: dict[str, Any] = field(default_factory=dict)
     """Versions, device and precision."""
 
     @property
     def sphere_centers(self) -> np.ndarray:
-        """Sphere centres in place [m], (spheres, 3), grain by grain."""
+        """Sphere centres [m], (spheres, 3), grain by grain."""
         return self._spheres[0]
 
     @property
@@ -71,14 +70,9 @@ class CaseResult:
 def place_spheres(
     positions: np.ndarray, orientations: np.ndarray, sizes: np.ndarray, clumps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centres [m], (spheres, 3), radii [m] and grains, (spheres,), of the spheres of grains, grain by grain.
+    """Return centres [m], (spheres, 3), radii [m] and grains, (spheres,), of the spheres, grain by grain.
 
-    Parameters
-    ----------
-    positions, orientations, sizes
-        As in `CaseResult`.
-    clumps : (n, S, 4) array
-        Spheres of each grain's shape, as in `CaseResult`.
+    The parameters are as in `CaseResult`, but `clumps` (n, S, 4) has the spheres of each grain's shape.
     """
     vector, scalar = orientations[:, None, :3], orientations[:, None, 3:]
     local = clumps[:, :, :3] * sizes[:, None, None]

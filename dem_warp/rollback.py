@@ -1,7 +1,7 @@
-"""The state of a batch a stretch ago, so that a world can take its last steps again.
+"""A copy of a batch's state, so that a world can repeat its last steps.
 
-A grain may come farther than the neighbour lists allow for, and its contacts be seen late. What a world does
-then follows from its lists; so it goes back to where they still held, and looks at them more often.
+A grain may move farther than the neighbour lists allow, so that its contacts are found late. The world then
+goes back to a state with valid lists and repeats the steps with more frequent checks.
 """
 
 import warp as wp
@@ -11,7 +11,7 @@ from dem_warp.solver import Solver
 
 
 class Rollback:
-    """A copy of all that the steps of a batch change, on its device."""
+    """Copy of everything that steps change, on the device."""
 
     def __init__(self, solver: Solver) -> None:
         self._worlds = solver.layout.world_count
@@ -20,11 +20,11 @@ class Rollback:
         self._kept = [wp.empty_like(array) for array in self._state]
 
     def keep(self) -> None:
-        """Remember the present state of all worlds, between two calls of `Solver.advance`."""
+        """Copy the present state of all worlds, between two calls of `Solver.advance`."""
         for kept, array in zip(self._kept, self._state, strict=True):
             wp.copy(kept, array)
 
     def restore(self, world: int) -> None:
-        """Bring a world back to where it was when it was last kept; no other world changes."""
+        """Restore the copied state of one world."""
         for kept, array in zip(self._kept, self._state, strict=True):
             wp.copy(array.reshape((self._worlds, -1))[world], kept.reshape((self._worlds, -1))[world])

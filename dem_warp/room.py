@@ -1,4 +1,4 @@
-"""Most neighbours of a world's grains: room that no packing of them should pass."""
+"""Capacities of the neighbour lists, from the densest packing of a world's grains."""
 
 from itertools import product
 
@@ -9,12 +9,12 @@ from dem_warp.triangles import meshes_of, most_within
 
 
 def neighbour_room(world: WorldSetup) -> tuple[int, int]:
-    """Partners of a sphere and entries of a grain that no packing of the world's grains should pass.
+    """Return the largest expected numbers of partners of a sphere and of entries of a grain.
 
     Raises
     ------
     ValueError
-        If there are more than the lists of a world can have.
+        If the lists of a world would be too long.
     """
     found, listed = 16, 32
     for shape, others in product(world.shapes, repeat=2):
@@ -25,16 +25,16 @@ def neighbour_room(world: WorldSetup) -> tuple[int, int]:
         listed = max(listed, int(shape.sphere_count * around * 0.7) + 32)
     triangles = _triangles_near(world)
     listed += triangles * max(shape.sphere_count for shape in world.shapes)
-    # two lists, whose places are counted in 32 bits
+    # indices of the two lists have 32 bits
     if 2 * world.grains.count * (listed + 8) >= 2**31:
         raise ValueError(
-            f"WorldSetup.skin: lists of {listed:,} neighbours for each of {world.grains.count:,} grains are "
-            f"too long, got a skin of {world.skin:g} [m]: lower it"
+            f"WorldSetup.skin: must be smaller for {world.grains.count:,} grains, got {world.skin:g} [m]: "
+            f"{listed:,} neighbours per grain are too many"
         )
     return found + triangles, -(-listed // 8) * 8
 
 
 def _triangles_near(world: WorldSetup) -> int:
-    """Triangles that a sphere lists at the most, and some more."""
+    """Return the largest expected number of triangles in the list of a sphere."""
     reach = world.largest_sphere + world.skin + world.reach
     return sum(int(1.5 * most_within(mesh, reach)) + 8 for mesh in meshes_of([world]))

@@ -1,4 +1,4 @@
-"""Many cases at once: on a GPU all worlds in one batch, on a CPU a world a process, spread over the cores."""
+"""Simulation of many cases: on a GPU all worlds in one batch, on a CPU one world per process."""
 
 import os
 import time
@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from dem_warp.batch import Onlooker, begin
+from dem_warp.batch import OnAdvance, begin
 from dem_warp.case import Case
 from dem_warp.checkpoint import CHECKPOINT_EVERY, Checkpoints
 from dem_warp.device import resolve_device
@@ -24,7 +24,7 @@ def simulate(
     on_progress: OnProgress | None = None,
     checkpoint: str | Path | None = None,
     checkpoint_every: float = CHECKPOINT_EVERY,
-    onlooker: Onlooker | None = None,
+    on_advance: OnAdvance | None = None,
 ) -> list[CaseResult]:
     """Simulate cases at once.
 
@@ -32,33 +32,32 @@ def simulate(
     ----------
     cases : sequence of Case
     device : str, optional
-        "cpu", "cuda" or "cuda:N"; by default the GPU if there is one.
+        "cpu", "cuda" or "cuda:N". Default: the GPU if there is one.
     workers : int or Processes, optional
-        Processes on a CPU; by default one a core. Warp's CPU kernels run on one thread. A number of them
+        Processes on a CPU, where Warp's kernels use one thread. Default: one per core. A number of processes
         start for this call; `Processes` stay for the next one.
     on_result : callable, optional
         Called with the index and the result of each case as it ends.
     on_progress : callable, optional
-        Called with a `Progress` now and then.
+        Called regularly with a `Progress`.
     checkpoint : str or Path, optional
-        Folder for checkpoints of the running cases. Cases that a killed run left there go on from where they
-        were, to the same bits; the file of a case is removed when it has ended.
+        Folder for checkpoints of the running cases. Cases that a killed run left there continue, to the same
+        bits; the file of a case is removed when it has ended.
     checkpoint_every : float
         Wall time between two checkpoints [s].
-    onlooker : callable, optional
-        Called with each running `Batch` after every stretch of its steps, in the process that runs it; it may
-        copy from the batch and changes nothing of it.
+    on_advance : callable, optional
+        Called with each running `Batch` after every advance, in its process; it must not change the batch.
 
     Returns
     -------
     list of CaseResult
-        In the order of the cases. A case that goes wrong has its status; it neither raises nor changes
-        another case.
+        Results in the order of the cases. A failed case has its status; it neither raises nor changes another
+        case.
 
     Raises
     ------
     ValueError
-        If the device is not there, or `checkpoint_every` is negative.
+        If there is no such device, or `checkpoint_every` is negative.
     """
     name = resolve_device(device)
     checkpoints = None if checkpoint is None else Checkpoints(checkpoint, checkpoint_every)
@@ -81,14 +80,14 @@ def simulate(
 
     with _processes(workers, len(cases)) as processes:
         if name == "cpu" and min(processes.count, len(cases)) > 1:
-            processes.run(cases, keep, report, checkpoints, onlooker)
+            processes.run(cases, keep, report, checkpoints, on_advance)
         else:
-            _run_batches(cases, name, keep, report, checkpoints, onlooker)
+            _run_batches(cases, name, keep, report, checkpoints, on_advance)
     return [results[i] for i in range(len(cases))]
 
 
 def _processes(workers: int | Processes | None, cases: int) -> AbstractContextManager[Processes]:
-    """Processes for one call, or those of a caller, who ends them."""
+    """Return processes for one call, or those of the caller, who ends them."""
     if isinstance(workers, Processes):
         return nullcontext(workers)
     return Processes(min(workers or os.cpu_count() or 1, cases))
@@ -100,13 +99,13 @@ def _run_batches(
     keep: OnResult,
     report: Report,
     checkpoints: Checkpoints | None,
-    onlooker: Onlooker | None,
+    on_advance: OnAdvance | None,
 ) -> None:
     """Run batch after batch in this process."""
     fractions, phases = [0.0] * len(cases), ["waiting"] * len(cases)
     reported = time.perf_counter()
     for members in batches(cases, one_each=device == "cpu"):
-        batch, begun, refused = begin([cases[i] for i in members], device, checkpoints, onlooker)
+        batch, begun, refused = begin([cases[i] for i in members], device, checkpoints, on_advance)
         for number, result in refused.items():
             fractions[members[number]] = 1.0
             keep(members[number], result)
@@ -122,10 +121,10 @@ def _run_batches(
 
 
 def batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
-    """Indices of the cases that run in one launch.
+    """Return the indices of the cases in each launch.
 
-    These share all that kernels are compiled for, so that a case runs the same code in any company. On a CPU
-    each runs alone, which keeps its world in the cache.
+    They have the same compiled kernels, so that a case runs the same code in any batch. On a CPU each case
+    runs alone, which keeps its world in the cache.
     """
     if one_each:
         return [[i] for i in range(len(cases))]

@@ -1,4 +1,4 @@
-"""Grain contours to fill with spheres: closed triangle meshes from files or from measured dimensions."""
+"""Grain contours: closed triangle meshes from files or from measured dimensions."""
 
 import inspect
 import io
@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dem_warp.parameters import Parameter
+
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
@@ -17,14 +19,14 @@ _FACETS = 48  # sides of a round section: its area is 0.3 % short of the circle'
 MILLIMETER = 1e-3
 
 MESH_KINDS = ("stl", "obj", "ply", "off")
-"""Endings of mesh files that are read: each holds one surface, and no other file."""
+"""Endings of readable mesh files: each holds one surface, without references to other files."""
 
 LARGEST_MESH = 50_000_000
-"""Bytes of the largest mesh file that is read."""
+"""Largest mesh file that is read [bytes]."""
 
 
 def read_mesh(path: str | Path, unit: float = MILLIMETER) -> "Trimesh":
-    """Read a closed surface from a mesh file.
+    """Read a closed surface from a mesh file, scale it to metres, and turn its faces outward.
 
     Parameters
     ----------
@@ -33,11 +35,6 @@ def read_mesh(path: str | Path, unit: float = MILLIMETER) -> "Trimesh":
     unit
         Length of the file's unit [m].
 
-    Returns
-    -------
-    Trimesh
-        The surface [m], its faces turned outward.
-
     Raises
     ------
     ValueError
@@ -45,38 +42,64 @@ def read_mesh(path: str | Path, unit: float = MILLIMETER) -> "Trimesh":
     FileNotFoundError
         If there is no such file.
     """
-    if not (math.isfinite(unit) and unit > 0.0):
-        raise ValueError(f"unit must be finite and positive [m], got {unit!r}")
+    Parameter("m", above=0.0).check("read_mesh.unit", unit)
     kind = Path(path).suffix.lower().removeprefix(".")
     if not Path(path).is_file():
-        raise FileNotFoundError(f"no mesh file {path}")
+        raise FileNotFoundError(f"{path}: no such file")
     if kind not in MESH_KINDS:
-        raise ValueError(f"{path}: a mesh file is one of {', '.join(MESH_KINDS)}, got {kind or 'no ending'}")
+        raise ValueError(f"{path}: must end in {', '.join(MESH_KINDS)}, got {kind or 'no ending'}")
     if (size := Path(path).stat().st_size) > LARGEST_MESH:
-        raise ValueError(f"{path}: a mesh file has at most {LARGEST_MESH:,} bytes, got {size:,}")
+        raise ValueError(f"{path}: must have at most {LARGEST_MESH:,} bytes, got {size:,}")
     try:
         mesh = _surface(Path(path).read_bytes(), kind)
-    except Exception as error:  # each reader of trimesh raises what it likes
-        raise ValueError(f"{path}: a mesh file that trimesh reads is needed, got {error!r}") from error
+    except Exception as error:  # the readers of trimesh raise many kinds of errors
+        raise ValueError(f"{path}: not a readable mesh: {error!r}") from error
     if mesh is None:
-        raise ValueError(f"{path}: the surface must be closed, got one with open or doubled edges")
+        raise ValueError(f"{path}: the surface must be closed, got open or doubled edges")
     if not (np.isfinite(mesh.vertices).all() and np.isfinite(mesh.volume) and mesh.volume > 0.0):
         raise ValueError(f"{path}: the corners must be finite, and the volume positive, got {mesh.volume!r}")
     return mesh.apply_scale(unit)
 
 
 def _surface(content: bytes, kind: str) -> "Trimesh | None":
-    """Return the surface of a file with its faces turned outward; None where it is not closed."""
+    """Return the surface of a file with its faces turned outward; None if it is not closed."""
     import trimesh
 
-    # from memory, so that a file names no other files to be read
+    # from memory, so that a file cannot refer to other files
     mesh = trimesh.load_mesh(io.BytesIO(content), file_type=kind)
     if not isinstance(mesh, trimesh.Trimesh):
         raise TypeError(f"a {type(mesh).__name__}")
     if not mesh.is_watertight:
         return None
-    mesh.fix_normals()
+    mesh.faces = _turned_outward(np.asarray(mesh.vertices), np.array(mesh.faces))
     return mesh
+
+
+def _turned_outward(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the faces of closed bodies, all in the direction that makes each body's volume positive."""
+    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    twins = np.lexsort(np.sort(edges, axis=1).T).reshape(-1, 2)  # each edge occurs twice
+    partner = np.empty(len(edges), dtype=int)
+    partner[twins] = twins[:, ::-1]
+    upward = edges[:, 0] < edges[:, 1]
+    agrees = (upward != upward[partner]).tolist()  # consistent faces pass their edge in opposite directions
+    neighbour = (partner // 3).tolist()
+    body, turned = [-1] * len(faces), [False] * len(faces)
+    for first in range(len(faces)):
+        if body[first] >= 0:
+            continue
+        body[first], waiting = first, [first]
+        while waiting:
+            face = waiting.pop()
+            for edge in range(3 * face, 3 * face + 3):
+                if body[other := neighbour[edge]] < 0:
+                    body[other], turned[other] = first, turned[face] == agrees[edge]
+                    waiting.append(other)
+    faces[turned] = faces[turned, ::-1]
+    volumes = np.bincount(body, np.linalg.det(vertices[faces]), minlength=len(faces))
+    inverted = volumes[body] < 0.0
+    faces[inverted] = faces[inverted, ::-1]
+    return faces
 
 
 def sphere_mesh(diameter: float) -> "Trimesh":
@@ -85,7 +108,7 @@ def sphere_mesh(diameter: float) -> "Trimesh":
 
 
 def ellipsoid_mesh(length: float, width: float, thickness: float) -> "Trimesh":
-    """Return an ellipsoid by its three axes [m], along x, y and z: wheat, beans, soy."""
+    """Return an ellipsoid by its three axes [m], along x, y and z, e.g. wheat, beans, soy."""
     import trimesh
 
     _check_lengths(length=length, width=width, thickness=thickness)
@@ -94,7 +117,7 @@ def ellipsoid_mesh(length: float, width: float, thickness: float) -> "Trimesh":
 
 
 def cylinder_mesh(length: float, diameter: float) -> "Trimesh":
-    """Return a cylinder along z [m]: pellets, cut straw."""
+    """Return a cylinder along z [m], e.g. pellets, cut straw."""
     import trimesh
 
     _check_lengths(length=length, diameter=diameter)
@@ -102,19 +125,19 @@ def cylinder_mesh(length: float, diameter: float) -> "Trimesh":
 
 
 def capsule_mesh(length: float, diameter: float) -> "Trimesh":
-    """Return a cylinder along z with round ends, by its length over all [m]: rice, oats."""
+    """Return a cylinder along z with round ends, by its total length [m], e.g. rice, oats."""
     import trimesh
 
     _check_lengths(length=length, diameter=diameter)
     if length <= diameter:
-        raise ValueError(f"length must exceed the diameter {diameter!r} of a capsule, got {length!r}")
-    # Of unit diameter first: trimesh merges vertices that are 1e-8 apart.
+        raise ValueError(f"length: must be above the diameter {diameter!r} of a capsule, got {length!r}")
+    # unit diameter first, as trimesh merges vertices within 1e-8
     slender = trimesh.creation.capsule(length / diameter - 1.0, radius=0.5, count=[_FACETS, _FACETS])
     return slender.apply_scale(diameter)
 
 
 def tri_pyramid_mesh(height: float, base_edge: float) -> "Trimesh":
-    """Return a pyramid over an equilateral triangle, its tip up z [m]: buckwheat and other achenes."""
+    """Return a pyramid over an equilateral triangle with its tip along z [m], e.g. buckwheat."""
     import trimesh
 
     _check_lengths(height=height, base_edge=base_edge)
@@ -133,46 +156,35 @@ SOLIDS: MappingProxyType[str, Callable[..., "Trimesh"]] = MappingProxyType(
         "tri-pyramid": tri_pyramid_mesh,
     }
 )
-"""Solids that dimensions describe, by the name that `parse_solid` takes."""
+"""Solids from dimensions, by the name for `parse_solid`."""
 
 
 def parse_solid(text: str) -> "Trimesh":
-    """Make a solid from a name and its dimensions in mm, as in ``tri-pyramid:5.90x3.93``.
-
-    Parameters
-    ----------
-    text
-        ``NAME:A[xB[xC]]`` with a name of `SOLIDS` and the dimensions of its function, in that order.
-
-    Returns
-    -------
-    Trimesh
-        The solid [m].
+    """Make a solid [m] from a name of `SOLIDS` and its dimensions in mm, e.g. ``tri-pyramid:5.90x3.93``.
 
     Raises
     ------
     ValueError
-        If the name is unknown, or a dimension is missing, too many, or not a positive number.
+        If the name is unknown, or the dimensions are not the right number of positive lengths.
     """
     name, _, dimensions = text.partition(":")
     if name not in SOLIDS:
-        raise ValueError(f"a solid is one of {', '.join(map(describe_solid, SOLIDS))} [mm], got {text!r}")
+        raise ValueError(f"solid: must be one of {', '.join(map(describe_solid, SOLIDS))} [mm], got {text!r}")
     try:
         lengths = [MILLIMETER * float(word) for word in dimensions.split("x")]
         if len(lengths) != len(inspect.signature(SOLIDS[name]).parameters):
             raise ValueError(f"got {len(lengths)} dimensions")
         return SOLIDS[name](*lengths)
     except ValueError as error:
-        raise ValueError(f"{text!r} must be {describe_solid(name)} in mm: {error}") from error
+        raise ValueError(f"{text!r}: must be {describe_solid(name)} in mm: {error}") from error
 
 
 def describe_solid(name: str) -> str:
-    """Return the pattern of a solid's text, such as ``cylinder:LENGTHxDIAMETER``."""
+    """Return the pattern of a solid's text, e.g. ``cylinder:LENGTHxDIAMETER``."""
     dimensions = inspect.signature(SOLIDS[name]).parameters
     return f"{name}:{'x'.join(dimension.upper() for dimension in dimensions)}"
 
 
 def _check_lengths(**lengths: float) -> None:
     for name, value in lengths.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} must be finite and positive [m], got {value!r}")
+        Parameter("m", above=0.0).check(name, value)

@@ -1,4 +1,4 @@
-"""The sequence of launches that moves a batch on, captured once as a graph and replayed."""
+"""The sequence of launches that steps a batch, captured once as a graph and replayed."""
 
 from collections.abc import Sequence
 from dataclasses import fields
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from dem_warp.kernels.candidates import LONGEST_CYCLE, candidate_kernels
 from dem_warp.kernels.cells import cell_kernels
 from dem_warp.kernels.lanes import BLOCK, WARP
 from dem_warp.kernels.neighbours import list_threads, neighbour_kernels
@@ -14,7 +15,6 @@ from dem_warp.kernels.stale import ALL
 from dem_warp.kernels.step import step_kernels
 from dem_warp.kernels.summation import MIN_LANES
 from dem_warp.kernels.walls import wall_kernels
-from dem_warp.kernels.watch import LONGEST_CYCLE, watch_kernels
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.model import WorldSetup
 from dem_warp.room import neighbour_room
@@ -28,49 +28,48 @@ from dem_warp.state import (
     living_grains,
 )
 from dem_warp.triangles import place_triangles
-from dem_warp.types import FRAMES, PRECISIONS, Build, Care
+from dem_warp.types import FRAMES, PRECISIONS, Build, CheckRate
 from dem_warp.view import WorldView, overviews
 from dem_warp.walls import Motion
 
 CHUNK = 256
-"""Steps that `advance` takes at the least; a multiple of every length of a cycle."""
+"""Least number of steps of `advance`; a multiple of every cycle length."""
 
 SHORTEST_CYCLE = 2
 SKIN_PER_CYCLE, SKIN_PER_SERIAL_CYCLE = 0.1, 0.3
-"""Part of the skin that the fastest grain of a world may use up between two looks at the neighbour list, on a
-GPU and on a CPU, where a rebuild costs what has moved alone."""
+"""Part of the skin that the fastest grain of a world may use up between two checks of the neighbour lists, on
+a GPU and on a CPU, where only moved grains cost in a rebuild."""
 
 SHORT_CYCLE, SKIN_PER_SHORT_CYCLE = 8, 0.25
-"""Steps up to which it may use up more on a GPU, where so few hardly pay for the look."""
+"""Cycle length up to which it may use up more on a GPU, as the check costs as much as so few steps."""
 
 LOOK_CHUNKS = 16
-"""Chunks after which the length of a cycle is chosen anew, from how fast the grains have become."""
+"""Chunks after which the cycle length is chosen again from the speed of the grains."""
 
 FULL_DEVICE_THREADS = 84_480
-"""Threads of a step that a large GPU, of 132 multiprocessors, runs at once; with fewer of them there is room
-for more lanes a grain, which shorten a step."""
+"""Threads of a step that a large GPU (132 multiprocessors) runs at once; with fewer threads more lanes per
+grain shorten a step."""
 
 MOST_LANES = 16
 
 ANY_PACE = 1.0e9
-"""Speed that no grain reaches [m/s]: with it every entry of a list is near."""
+"""Speed above that of any grain [m/s]: with it every entry of a list is a candidate."""
 
 
 class Solver:
     """A batch of worlds on one device.
 
-    Every world steps with its own time step and parameters; worlds share nothing but the launches. The state
-    of a world after a number of steps depends on its setup alone, not on the other worlds, its place, the
-    lanes or the skin.
+    Every world has its own time step and parameters; worlds share only the launches. The state of a world
+    after a number of steps depends on its setup alone, not on other worlds, its place, the lanes or the skin.
 
     Parameters
     ----------
     worlds : sequence of WorldSetup
-        With the same walls, contacts and mechanisms in number and kind.
+        Worlds with equal numbers of walls and contacts, and equal mechanisms.
     device : str or warp Device
     precision : "mixed" or "double"
     capacity : int, optional
-        Neighbours a grain; by default from the densest packing of the spheres.
+        Neighbours per grain. Default: from the densest packing of the spheres.
     """
 
     def __init__(
@@ -94,16 +93,16 @@ class Solver:
         self._wall_kernels = wall_kernels(self.build.without_forces)
         self._list_kernels = neighbour_kernels(self.build)
         room = [neighbour_room(world) for world in worlds]
-        self._watch_kernels = watch_kernels(self.build)
+        self._candidate_kernels = candidate_kernels(self.build)
         self.cycle_limit = LONGEST_CYCLE
-        self.care = Care.USUAL
+        self.check_rate = CheckRate.USUAL
         with wp.ScopedDevice(self.device):
             self._build_state([(found, capacity or listed) for found, listed in room])
         self._running = list(range(len(worlds)))
         self._pace = np.array([(w.time_step, w.skin, np.linalg.norm(w.gravity)) for w in worlds]).T
         self._impulse_of_count = np.array([w.time_step / w.force_rate for w in worlds])
-        self._graphs: dict[tuple[int, int, int, Care], Any] = {}
-        self._orders: tuple[Any, ...] = ()
+        self._graphs: dict[tuple[int, int, int, CheckRate], Any] = {}
+        self._commands: tuple[Any, ...] = ()
         self._place()
 
     def _build_state(self, room: Sequence[tuple[int, int]]) -> None:
@@ -112,7 +111,7 @@ class Solver:
         self.model = build_model(self.worlds, room, layout, self.precision, device)
         self._trees = place_triangles(self.model, self.worlds, self.precision, device)
         first = build_grains(self.worlds, layout, self.precision, device)
-        # a single thread moves grains when it has all their forces, and needs no second copy
+        # a single thread moves grains after all forces are known, without a second copy
         self.grains = (first, copy_grains(first, self.precision) if self.device.is_cuda else first)
         remembered = memory_size(layout.mechanisms, layout.forms)
         self.neighbours = build_neighbours(layout, capacity, remembered, self.precision, device)
@@ -131,20 +130,18 @@ class Solver:
         self._place_walls(FRAMES - 1)
         self.stale.fill_(ALL)
         self._rebuild(0)
-        self._look_back(0)
+        self._check_cycle(0)
 
     def _whole_warps(self, threads: int) -> int:
-        """Threads that fill whole warps of a GPU, whose lanes work together."""
+        """Return the number of threads rounded up to whole warps of a GPU."""
         return -(-threads // WARP) * WARP if self.device.is_cuda else threads
 
     def _launch(self, kernel: Any, dim: int, inputs: list[Any]) -> None:
         wp.launch(kernel, dim, inputs=inputs, device=self.device, block_dim=BLOCK)
 
-    # ---- the sequence of a step ----------------------------------------------------------------------------
-
     @property
     def lanes(self) -> int:
-        """Threads a grain: few when many grains fill the device, more when there is room."""
+        """Threads per grain: more if few grains run."""
         if not self.device.is_cuda:
             return 1
         grains = max(len(self._running) * self.layout.grain_count, 1)
@@ -153,8 +150,8 @@ class Solver:
             lanes //= 2
         return lanes
 
-    def _order(self, read: int) -> Any:
-        """Order of a step that may be given any number of times: to make one takes longer than to give it."""
+    def _step_command(self, read: int) -> Any:
+        """Return a recorded launch of a step, which is faster to repeat than to create."""
         slots = len(self._running) * self.layout.grain_count
         threads = self._whole_warps(slots * self.lanes) if self.device.is_cuda else 1
         inputs = [
@@ -165,7 +162,7 @@ class Solver:
         return wp.launch(kernel, threads, inputs=inputs, device=self.device, block_dim=BLOCK, record_cmd=True)
 
     def _step(self, read: int) -> None:
-        self._orders[read].launch()
+        self._commands[read].launch()
 
     def _place_walls(self, ahead: int, read: int = 0) -> None:
         frames = len(self.worlds) * self.layout.wall_count * (ahead + 1)
@@ -188,48 +185,48 @@ class Solver:
 
     def _rebuild_together(self, steps: int, read: int) -> None:
         inputs = [steps, self.model, self.grains[read], self.alive, self.idle, self.neighbours, self.stale]
-        self._launch(self._watch_kernels.join, self.layout.grain_total, inputs)
+        self._launch(self._candidate_kernels.join, self.layout.grain_total, inputs)
         self._rebuild(read)
 
-    def _look_ahead(self, steps: int, read: int) -> None:
-        """See to it that the next steps meet every contact."""
-        watch, grains, total = self._watch_kernels, self.grains[read], self.layout.grain_total
+    def _prepare_cycle(self, steps: int, read: int) -> None:
+        """Prepare wall places, neighbour lists and contact candidates for the next steps."""
+        kernels, grains, total = self._candidate_kernels, self.grains[read], self.layout.grain_total
         self._place_walls(steps, read)
-        if self.care == Care.EVERY_STEP:
+        if self.check_rate == CheckRate.EVERY_STEP:
             self.stale.fill_(ALL)
             self.any_stale.fill_(1)
         seen = [self.model, grains, self.alive, self.idle]
         inputs = [steps, *seen, self.fastest, self.neighbours, self.stale, self.any_stale]
-        self._launch(watch.mark_stale, total, inputs)
+        self._launch(kernels.mark_stale, total, inputs)
         wp.capture_if(self.any_stale, self._rebuild_together, steps=steps, read=read)
         threads = total * WARP if self.device.is_cuda else total
-        striking = [steps, self.model, self.alive, self.idle, self.fastest, self.neighbours]
-        self._launch(watch.heed_neighbours, threads, striking)
-        if self.care == Care.EVERY_STEP:
+        inputs = [steps, self.model, self.alive, self.idle, self.fastest, self.neighbours]
+        self._launch(kernels.raise_pace, threads, inputs)
+        if self.check_rate == CheckRate.EVERY_STEP:
             self.neighbours.near.pace.fill_(ANY_PACE)
-        self._launch(watch.select_near, threads, [steps, *seen, self.neighbours, self.fastest])
+        self._launch(kernels.select_near, threads, [steps, *seen, self.neighbours, self.fastest])
 
-    def _look_back(self, read: int) -> None:
-        """Find out how fast the grains have become, and whether all contacts were met."""
+    def _check_cycle(self, read: int) -> None:
+        """Find the fastest grains, and flag worlds that may have missed a contact."""
         row = self._whole_warps(self.layout.grain_count)
         inputs = [
             row, self.model, self.grains[read], self.alive, self.idle, self.neighbours, self.fastest,
             self.flags,
         ]  # fmt: skip
-        self._launch(self._watch_kernels.find_fastest, row * self.layout.world_count, inputs)
+        self._launch(self._candidate_kernels.find_fastest, row * self.layout.world_count, inputs)
 
     def _cycle(self, steps: int, read: int = 0) -> None:
-        """Take steps between two looks, or with a look before each."""
-        each = 1 if self.care == Care.EVERY_STEP else steps
-        self._orders = self._order(0), self._order(1)
+        """Take steps between two checks of the lists, or with a check before each."""
+        each = 1 if self.check_rate == CheckRate.EVERY_STEP else steps
+        self._commands = self._step_command(0), self._step_command(1)
         for first in range(read, read + steps, each):
-            self._look_ahead(each, first % 2)
+            self._prepare_cycle(each, first % 2)
             for step in range(first, first + each):
                 self._step(step % 2)
-            self._look_back((first + each) % 2)
+            self._check_cycle((first + each) % 2)
 
     def _graph(self, cycle: int) -> Any:
-        key = (self.lanes, len(self._running), cycle, self.care)
+        key = (self.lanes, len(self._running), cycle, self.check_rate)
         if key not in self._graphs:
             with wp.ScopedCapture(self.device) as capture:
                 for _ in range(self._cycles_captured(cycle)):
@@ -238,16 +235,15 @@ class Solver:
         return self._graphs[key]
 
     def _cycles_captured(self, cycle: int) -> int:
-        """Cycles of a graph: several short ones on a GPU, which takes its time to begin a graph, a single one
-        on a CPU, which does not. What a longer graph saves is less than it takes to capture."""
+        """Return the cycles of a graph: several short ones on a GPU, where starting a graph is slow."""
         return LONGEST_CYCLE // cycle if self.device.is_cuda else 1
 
     def _cycle_length(self, chunks: int) -> int:
-        """Steps of a cycle, a power of two: as many as the lists allow the fastest grain of any world.
+        """Return the steps of a cycle, a power of two, that the lists allow the fastest grain of any world.
 
-        Grains gain speed by their weight for some chunks; what else sets them in motion, the lists allow for.
+        Grains gain speed by their weight for some chunks; the lists allow for other accelerations.
         """
-        if self.care != Care.USUAL:
+        if self.check_rate != CheckRate.USUAL:
             return SHORTEST_CYCLE
         time_step, skin, gravity = self._pace[:, self._running]
         speed = self.fastest.numpy()[self._running] + gravity * chunks * CHUNK * time_step
@@ -270,8 +266,6 @@ class Solver:
                 wp.capture_launch(graph)
             chunks -= ahead
 
-    # ---- what a scene does between chunks ------------------------------------------------------------------
-
     def _set_running(self, running: Sequence[int]) -> None:
         self._running = list(running)
         slots = np.zeros(self.layout.world_count, dtype=np.int32)
@@ -286,7 +280,7 @@ class Solver:
         self._set_running([w for w in self._running if w != world])
 
     def remove(self, world: int, grains: np.ndarray) -> None:
-        """Take grains (slots of the world) out of it."""
+        """Remove grains from a world, by slot."""
         rows = np.asarray(grains, dtype=np.int32) + world * self.layout.grain_count
         if rows.size:
             removed: Any = wp.array(rows, dtype=int, device=self.device)
@@ -295,11 +289,11 @@ class Solver:
             )
 
     def move_wall(self, world: int, wall: int, motion: Motion) -> None:
-        """Let a wall move on from its present place, in any way, from the present step on."""
+        """Give a wall a new motion from its present place, from the present step on."""
         self.move_walls([(world, wall, motion)])
 
     def move_walls(self, moves: Sequence[tuple[int, int, Motion]]) -> None:
-        """Let several walls move on, each given by its world and its number; hardly longer than one."""
+        """Give walls new motions, each by world and number, in about the time of one."""
         if not moves:
             return
         walls, stale = np.array(self.model.wall.numpy()), np.array(self.stale.numpy())
@@ -315,40 +309,37 @@ class Solver:
             stale[world] = ALL
         self.model.wall.assign(walls)
         self._place_walls(0)
-        # the lists know of the old motion only
+        # the lists allow for the old motion only
         self.stale.assign(stale)
         self._rebuild(0)
-        self._look_back(0)
+        self._check_cycle(0)
 
     def wall_pose(self, world: int, wall: int) -> tuple[np.ndarray, np.ndarray]:
-        """Place of the wall's own point [m], and how far the wall has turned (quaternion x y z w)."""
+        """Return the place of the wall's own point [m] and its orientation (quaternion x y z w)."""
         self._place_walls(0)
         frame = self._frame(world, wall).numpy()[0]
         return np.array(frame["origin"]), np.array(frame["rotation"])
 
     def _frame(self, world: int, wall: int) -> Any:
-        """Place of a wall in the present step, as an array of one on the device."""
+        """Return the frame of a wall in the present step, as an array of one on the device."""
         step = int(self.grains[0].step[world : world + 1].numpy()[0])
         place = (world * self.layout.wall_count + wall) * FRAMES + step % FRAMES
         return self.model.frame[place : place + 1]
 
     def impulses(self) -> np.ndarray:
-        """Impulse of the grains on the wall that is weighed, along z, since the first step [N s].
+        """Return the impulse of the grains on the weighed wall of each world along z, from step 0 [N s].
 
-        Returns
-        -------
-        (worlds,) array
-            The sum over all steps of force times time step; 0 where no wall is weighed.
+        It is the sum over all steps of force times time step; 0 without a weighed wall.
         """
         counts = self.neighbours.pushed.numpy().reshape(self.layout.world_count, -1).sum(axis=1)
         return np.asarray(counts * self._impulse_of_count)
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
-        """State of some worlds for their scenes, copied from the device."""
+        """Return the state of some worlds for their scenes, copied from the device."""
         n, grains = self.layout.grain_count, self.grains[0]
         chosen: Any = list(worlds)
         if self.device.is_cuda and chosen == list(range(self.layout.world_count)):
-            chosen = slice(None)  # all are copies from the device already
+            chosen = slice(None)  # the arrays are already copies
         steps = grains.step.numpy()[chosen]
         alive = self.alive.numpy().reshape(-1, n)[chosen] > 0
         released = self.model.release_step.numpy().reshape(-1, n)[chosen] <= steps[:, None]
@@ -368,7 +359,7 @@ class Solver:
         return [WorldView(*each) for each in zip(*numbers, strict=True)]
 
     def poses(self, world: int) -> dict[str, np.ndarray]:
-        """Slots, positions [m], orientations, velocities [m/s] and spins [rad/s] of the living grains."""
+        """Return slots, positions [m], orientations, velocities [m/s] and spins [rad/s] of the grains."""
         n = self.layout.grain_count
         rows = slice(world * n, (world + 1) * n)
         slots = np.flatnonzero(self.alive[rows].numpy() > 0)

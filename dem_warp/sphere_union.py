@@ -1,9 +1,8 @@
 """Volume and moments of a union of spheres, every overlap counted once.
 
-The divergence theorem turns them into integrals over the surface of the union, which is the part of each
-sphere that no other sphere covers. On a circle of latitude that part is a set of arcs with known ends, so the
-integrand is smooth between breakpoints that are known too (but for kinks where three spheres meet), and Gauss
-quadrature converges fast.
+The divergence theorem turns them into integrals over the surface of the union: the uncovered part of each
+sphere. On a circle of latitude that part is a set of arcs with known ends, so the integrand is smooth between
+known breakpoints (except for kinks where three spheres meet), and Gauss quadrature converges fast.
 """
 
 from typing import NamedTuple
@@ -35,20 +34,15 @@ class Moments(NamedTuple):
 
 
 def union_moments(centers: Array, radii: Array, resolution: int = DEFAULT_RESOLUTION) -> Moments:
-    """Volume, centroid and second moments of a union of spheres.
+    """Return volume, centroid and second moments of a union of spheres.
 
     Parameters
     ----------
     centers, radii
-        Spheres [m], shapes (S, 3) and (S,). They may overlap, touch, lie apart or inside one another.
+        Spheres [m], shapes (S, 3) and (S,).
     resolution
-        Gauss nodes between two breakpoints of the latitude. Two spheres converge exponentially; where three
-        meet, a kink between breakpoints leaves a relative error below 1e-4 at 64 and 1e-3 at 12.
-
-    Returns
-    -------
-    Moments
-        Integrals over the union.
+        Gauss nodes between two breakpoints of the latitude. Two spheres converge exponentially; with kinks
+        where three meet, the relative error is below 1e-4 at 64 and 1e-3 at 12.
 
     Raises
     ------
@@ -56,7 +50,7 @@ def union_moments(centers: Array, radii: Array, resolution: int = DEFAULT_RESOLU
         If the resolution is below 1.
     """
     if resolution < 1:
-        raise ValueError(f"resolution must be 1 or more, got {resolution!r}")
+        raise ValueError(f"resolution: must be 1 or more, got {resolution!r}")
     origin = 0.5 * ((centers - radii[:, None]).min(axis=0) + (centers + radii[:, None]).max(axis=0))
     shown = _outer_spheres(centers, radii)
     centers, radii = centers[shown] - origin, radii[shown]
@@ -74,14 +68,14 @@ def union_moments(centers: Array, radii: Array, resolution: int = DEFAULT_RESOLU
 
 
 def _outer_spheres(centers: Array, radii: Array) -> NDArray[np.bool_]:
-    """Mark the spheres that lie inside no other one; of equal spheres the first stays."""
+    """Mark the spheres that are not inside another one; of equal spheres the first stays."""
     gaps = np.linalg.norm(centers[:, None] - centers[None, :], axis=2)
     inside = gaps + radii[:, None] <= radii[None, :]
     return ~(inside & (~inside.T | np.tri(len(radii), k=-1, dtype=bool))).any(axis=1)
 
 
 def _exposed_surface(index: int, centers: Array, radii: Array, resolution: int) -> tuple[Array, Array]:
-    """Quadrature of the part of one sphere that no other covers: normals (N, 3) and areas (N,)."""
+    """Return the quadrature of the uncovered part of one sphere: normals (N, 3) and areas (N,)."""
     radius = radii[index]
     offsets = np.delete(centers, index, axis=0) - centers[index]
     others = np.delete(radii, index)
@@ -102,7 +96,7 @@ def _exposed_surface(index: int, centers: Array, radii: Array, resolution: int) 
 
 
 def _latitudes(offsets: Array, cap_cosines: Array, resolution: int) -> tuple[Array, Array]:
-    """Nodes and weights of the polar angle, with breakpoints where a cap begins and ends."""
+    """Return nodes and weights of the polar angle, with breakpoints where a cap begins and ends."""
     tilt = np.arctan2(np.hypot(offsets[:, 0], offsets[:, 1]), offsets[:, 2])
     reach = np.arccos(np.clip(cap_cosines, -1.0, 1.0))
     breaks = np.abs(np.concatenate([[0.0, np.pi], tilt - reach, tilt + reach]))
@@ -115,7 +109,7 @@ def _latitudes(offsets: Array, cap_cosines: Array, resolution: int) -> tuple[Arr
 
 
 def _exposed_arcs(offsets: Array, levels: Array, polar: Array) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Arcs of latitude outside all caps: first azimuth, length and index of the latitude, each (A,)."""
+    """Return the arcs of latitude outside all caps: first azimuth, length and latitude index, each (A,)."""
     facing = np.arctan2(offsets[:, 1], offsets[:, 0])
     leans = np.outer(np.sin(polar), np.hypot(offsets[:, 0], offsets[:, 1]))
     cosines = (levels - np.outer(np.cos(polar), offsets[:, 2])) / np.maximum(leans, np.finfo(float).tiny)
@@ -133,6 +127,6 @@ def _exposed_arcs(offsets: Array, levels: Array, polar: Array) -> tuple[Array, A
 
 
 def _unit_gauss(count: int) -> tuple[Array, Array]:
-    """Gauss-Legendre nodes and weights on (0, 1)."""
+    """Return Gauss-Legendre nodes and weights on (0, 1)."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     return 0.5 * (nodes + 1.0), 0.5 * weights

@@ -1,4 +1,4 @@
-"""The device arrays of a batch: what stays (`Model`), what moves (`Grains`, twice), the neighbour lists."""
+"""The device arrays of a batch: constants (`Model`), state (`Grains`, twice) and neighbour lists."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Layout:
 
     @classmethod
     def of(cls, worlds: Sequence[WorldSetup]) -> "Layout":
-        """Layout that holds all worlds; worlds with fewer grains are padded."""
+        """Return the layout of all worlds; worlds with fewer grains are padded."""
         alike: dict[str, set[Any]] = {
             "number of walls": {len(world.walls) for world in worlds},
             "number of contacts": {len(world.contacts) for world in worlds},
@@ -39,9 +39,8 @@ class Layout:
         }
         for name, found in alike.items():
             if len(found) > 1:
-                raise ValueError(
-                    f"worlds of one batch must have the same {name}, got {sorted(found, key=str)}"
-                )
+                rule = f"all in a batch must have the same {name}"
+                raise ValueError(f"worlds: {rule}, got {sorted(found, key=str)}")
         return cls(
             len(worlds),
             max(world.grains.count for world in worlds),
@@ -67,7 +66,7 @@ class Layout:
 def _padded(
     worlds: Sequence[WorldSetup], layout: Layout, rows: Sequence[np.ndarray], fill: Any, width: int
 ) -> np.ndarray:
-    """Stack one array a world into (grain slots, width), the free slots filled."""
+    """Stack one array per world into (grain slots, width), with free slots filled."""
     out = np.empty((layout.world_count, layout.grain_count, width))
     out[:] = fill
     for w, row in enumerate(rows):
@@ -76,7 +75,7 @@ def _padded(
 
 
 def struct_array(struct: Any, rows: Sequence[dict[str, Any]], device: Any) -> wp.array:
-    """Device array of `struct` from one dictionary of fields a row."""
+    """Return a device array of a struct from one dictionary of fields per row."""
     host = np.zeros(len(rows), dtype=struct.numpy_dtype())
     for i, row in enumerate(rows):
         for name, value in row.items():
@@ -84,17 +83,16 @@ def struct_array(struct: Any, rows: Sequence[dict[str, Any]], device: Any) -> wp
     return wp.array(host, dtype=struct, device=device)
 
 
+WALL_SHAPE = ("kind", "axis", "radius", "upper_radius", "length", "reach")
+"""Fields of a wall that follow from its shape."""
+
+
 def _wall_rows(worlds: Sequence[WorldSetup]) -> list[dict[str, Any]]:
-    """Fields of every wall at rest, world by world."""
+    """Return the fields of every wall at rest, world by world."""
     return [
-        {
-            "kind": wall.kind,
+        {name: getattr(wall, name) for name in WALL_SHAPE}
+        | {
             "pair": pair,
-            "axis": wall.axis,
-            "radius": wall.radius,
-            "upper_radius": wall.upper_radius,
-            "length": wall.length,
-            "reach": wall.reach,
             "point": wall.point,
             "orientation": (0.0, 0.0, 0.0, 1.0),
             "weighed": number == world.weighed,
@@ -111,10 +109,7 @@ def build_model(
     precision: Precision,
     device: Any,
 ) -> Any:
-    """`Model` of a batch on a device.
-
-    `room` has, for each world, how many partners a sphere may have and how many entries a grain's list.
-    """
+    """Return the `Model` of a batch; `room` has the limits of `neighbour_room` for each world."""
     types = device_structs(precision)
     shapes = shape_table(worlds)
     real = np.float32 if precision.real is wp.float32 else np.float64
@@ -132,12 +127,12 @@ def build_model(
             "reach": world.reach,
             "cell_rate": _cell_rate(world, precision),
             "speed_limit": world.speed_limit,
-            "kept": np.exp(-world.air_drag * world.time_step),
+            "drag_factor": np.exp(-world.air_drag * world.time_step),
             "force_rate": world.force_rate,
             "origin": world.origin,
             "half_extent": world.half_extent,
-            "most_found": found,
-            "most_listed": listed,
+            "found_limit": found,
+            "list_limit": listed,
         }
         for world, (found, listed) in zip(worlds, room, strict=True)
     ]
@@ -159,7 +154,7 @@ def build_model(
 
 
 def _cell_rate(world: WorldSetup, precision: Precision) -> float:
-    """Cells per count of a sphere position; a cell holds a contact's reach, and a little for rounding."""
+    """Return the cells per count of a sphere position; a cell is as wide as a contact's reach and 1 %."""
     unit = world.length_unit if precision.is_fixed_point else 1.0
     return unit / (1.01 * (2 * world.largest_sphere + world.skin + world.reach))
 
@@ -171,7 +166,7 @@ def _ints(
 
 
 def build_grains(worlds: Sequence[WorldSetup], layout: Layout, precision: Precision, device: Any) -> Any:
-    """`Grains` of a batch at the start on a device; spheres are still to be placed."""
+    """Return the initial `Grains` of a batch, without places of the spheres."""
     types = device_structs(precision)
     real = np.float32 if precision.real is wp.float32 else np.float64
     positions = _padded(worlds, layout, [world.grains.positions for world in worlds], 0.0, 3)
@@ -200,12 +195,12 @@ def build_grains(worlds: Sequence[WorldSetup], layout: Layout, precision: Precis
 
 
 def arrays_of(struct: Any) -> dict[str, wp.array]:
-    """Arrays of a struct by field."""
+    """Return the arrays of a struct by field."""
     return {name: value for name, value in vars(struct).items() if isinstance(value, wp.array)}
 
 
 def copy_grains(grains: Any, precision: Precision) -> Any:
-    """A second copy of `Grains`, for steps that read one and write the other."""
+    """Return a second copy of `Grains`, for steps that read one and write the other."""
     other = device_structs(precision).Grains()
     for name, array in arrays_of(grains).items():
         setattr(other, name, wp.clone(array))
@@ -213,7 +208,7 @@ def copy_grains(grains: Any, precision: Precision) -> Any:
 
 
 def living_grains(worlds: Sequence[WorldSetup], layout: Layout, device: Any) -> wp.array:
-    """1 for each slot that holds a grain at the start."""
+    """Return 1 for each slot with a grain at the start, 0 for the others."""
     alive = np.zeros((layout.world_count, layout.grain_count), dtype=np.int32)
     for w, world in enumerate(worlds):
         alive[w, : world.grains.count] = 1
@@ -223,60 +218,53 @@ def living_grains(worlds: Sequence[WorldSetup], layout: Layout, device: Any) -> 
 def build_neighbours(
     layout: Layout, capacity: int, remembered: int, precision: Precision, device: Any
 ) -> Any:
-    """Empty `Neighbours` of a batch, of which the mechanisms remember some values a contact."""
-    neighbours = device_structs(precision).Neighbours()
-    slots = layout.grain_total * capacity
+    """Return empty `Neighbours` of a batch; `remembered` is the number of a contact's values in memory."""
+    types, real = device_structs(precision), precision.real
+    neighbours, near, reactions = types.Neighbours(), types.Near(), types.Reactions()
+    grains, worlds = layout.grain_total, layout.world_count
+    slots, serial = grains * capacity, 0 if wp.get_device(device).is_cuda else grains
     neighbours.capacity = capacity
-    neighbours.count = wp.zeros(layout.grain_total, dtype=int, device=device)
-    neighbours.entry = wp.zeros(slots, dtype=int, device=device)
+    _clear(neighbours, grains, device, count=int, travel=real, pushed=wp.int64)
     # all zero is a displacement of zero, remembered at step 0: no history
-    neighbours.history = wp.zeros(slots, dtype=precision.vec4, device=device)
-    neighbours.memory = wp.zeros(slots * remembered, dtype=precision.real, device=device)
-    neighbours.rebuilt = wp.zeros(layout.world_count, dtype=int, device=device)
-    neighbours.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
-    neighbours.pushed = wp.zeros(layout.grain_total, dtype=wp.int64, device=device)
-    near = device_structs(precision).Near()
-    near.count = wp.zeros(layout.grain_total, dtype=int, device=device)
-    near.item = wp.zeros(layout.grain_total * capacity, dtype=wp.vec2i, device=device)
-    near.speed = wp.zeros(layout.grain_total, dtype=float, device=device)
-    near.wall_speed = wp.zeros(layout.world_count, dtype=float, device=device)
-    near.pace = wp.zeros(layout.grain_total, dtype=float, device=device)
-    near.path = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
-    near.wall_path = wp.zeros(layout.world_count, dtype=precision.real, device=device)
-    near.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
-    serial = 0 if wp.get_device(device).is_cuda else layout.grain_total
-    near.moves = wp.zeros(layout.grain_total, dtype=int, device=device)
-    near.first = wp.zeros(serial, dtype=int, device=device)
-    near.afar = wp.zeros(layout.grain_total, dtype=int, device=device)
-    near.top = wp.full(layout.world_count, np.inf, dtype=float, device=device)
-    neighbours.near = near
-    neighbours.reactions = device_structs(precision).Reactions()
-    for name in ("force", "torque"):
-        setattr(neighbours.reactions, name, wp.zeros(serial, dtype=precision.vec4, device=device))
+    _clear(neighbours, slots, device, entry=int, history=precision.vec4)
+    _clear(neighbours, slots * remembered, device, memory=real)
+    _clear(neighbours, worlds, device, rebuilt=int)
+    _clear(
+        near, grains, device, count=int, speed=float, pace=float, path=real, travel=real, moves=int, afar=int
+    )
+    _clear(near, worlds, device, wall_speed=float, wall_path=real)
+    _clear(near, slots, device, item=wp.vec2i)
+    _clear(near, serial, device, first=int)
+    near.top = wp.full(worlds, np.inf, dtype=float, device=device)
+    _clear(reactions, serial, device, force=precision.vec4, torque=precision.vec4)
+    neighbours.near, neighbours.reactions = near, reactions
     return neighbours
+
+
+def _clear(struct: Any, size: int, device: Any, **kinds: Any) -> None:
+    """Give a struct arrays of zeros, by field."""
+    for name, kind in kinds.items():
+        setattr(struct, name, wp.zeros(size, dtype=kind, device=device))
 
 
 def build_cells(
     layout: Layout, found_capacity: int, capacity: int, remembered: int, precision: Precision, device: Any
 ) -> Any:
-    """Empty `Cells` of a batch, with room for partners of a sphere and entries of a list."""
+    """Return empty `Cells` of a batch, with capacities for partners of a sphere and entries of a list."""
     cells = device_structs(precision).Cells()
     bits = max(int(np.ceil(np.log2(2 * layout.grain_count * layout.sphere_count))), 6)
     across = bits // 3
     cells.bits = wp.vec3i(across, across, bits - 2 * across)
-    cells.bucket_size = wp.zeros(layout.world_count << bits, dtype=int, device=device)
-    cells.bucket_start = wp.zeros(layout.world_count << bits, dtype=int, device=device)
-    cells.cursor = wp.zeros(layout.world_count, dtype=int, device=device)
-    for name in ("bucket", "rank", "order", "found_count"):
-        setattr(cells, name, wp.zeros(layout.sphere_total, dtype=int, device=device))
-    cells.ordered = wp.zeros(layout.sphere_total, dtype=precision.sphere, device=device)
-    cells.found = wp.zeros(layout.sphere_total * found_capacity, dtype=int, device=device)
+    spheres = layout.sphere_total
+    _clear(cells, layout.world_count << bits, device, bucket_size=int, bucket_start=int)
+    _clear(cells, layout.world_count, device, cursor=int)
+    _clear(cells, spheres, device, bucket=int, rank=int, order=int, found_count=int, ordered=precision.sphere)
+    _clear(cells, spheres * found_capacity, device, found=int)
     cells.found_capacity = found_capacity
-    # a single thread drafts one list after another
+    # a single thread writes one list after another
     drafts = capacity * (layout.grain_total if wp.get_device(device).is_cuda else 1)
-    cells.drafts = wp.zeros(drafts, dtype=int, device=device)
-    cells.draft_history = wp.zeros(drafts, dtype=precision.vec4, device=device)
-    cells.draft_memory = wp.zeros(drafts * remembered, dtype=precision.real, device=device)
+    _clear(cells, drafts, device, drafts=int, draft_history=precision.vec4)
+    _clear(cells, drafts * remembered, device, draft_memory=precision.real)
     return cells
 
 

@@ -1,4 +1,4 @@
-"""Triangles of the meshes of a batch, and who is beside whom, as device arrays."""
+"""Triangles of the meshes of a batch, and their neighbours, as device arrays."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from dem_warp.types import Precision, device_structs
 from dem_warp.walls import Mesh
 
 SAMPLE = 200
-"""Triangles of a mesh, at the most, around which the others are counted."""
+"""Most triangles of a mesh around which the others are counted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,20 +21,19 @@ class TriangleTable:
     """Triangles of one mesh."""
 
     corners: np.ndarray
-    """From the mesh's point [m], each triangle's in the order of the vertices' numbers: so two triangles
-    have an edge that they share the same way around, shape (m, 3, 3)."""
+    """Corners from the mesh's point [m], sorted by the vertices' numbers, so that two triangles have a shared
+    edge in the same direction, shape (m, 3, 3)."""
     normals: np.ndarray
     """Unit vectors, shape (m, 3)."""
     first: np.ndarray
     count: np.ndarray
-    """First place in `beside` of a triangle's neighbours, and their number, shape (m,)."""
-    beside: np.ndarray
-    """8 times a neighbour's number, plus bits 1, 2 and 4 for the own corners that it shares, shape
-    (k,)."""
+    """First index in `adjacent` of a triangle's neighbours, and their number, shape (m,)."""
+    adjacent: np.ndarray
+    """8 times a neighbour's number, plus bits 1, 2 and 4 for the own corners that it shares, shape (k,)."""
 
     @classmethod
     def of(cls, mesh: Mesh) -> "TriangleTable":
-        """Table of a mesh; vertices of equal coordinates are one."""
+        """Return the table of a mesh, with vertices of equal coordinates merged."""
         vertices, number = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)
         faces = np.sort(number.ravel()[mesh.faces], axis=1)
         corners = (vertices - np.array(mesh.point))[faces]
@@ -46,7 +45,7 @@ class TriangleTable:
 
 
 def _neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of triangles that share corners, sorted, and bits for the corners of the first of the pair."""
+    """Return the sorted pairs of triangles that share corners, and the bits of the first one's corners."""
     order = np.argsort(faces, axis=None, kind="stable")
     vertex, triangle, corner = faces.ravel()[order], order // 3, 1 << (order % 3)
     begin, end = np.searchsorted(vertex, vertex), np.searchsorted(vertex, vertex, side="right")
@@ -64,7 +63,7 @@ def _neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def most_within(mesh: Mesh, reach: float) -> int:
-    """Most triangles that lie about as near as `reach` [m] to a point of the mesh."""
+    """Return about the largest number of triangles within `reach` [m] of a point of the mesh."""
     corners = mesh.vertices[mesh.faces]
     lower, upper = corners.min(axis=1) - reach, corners.max(axis=1) + reach
     middles = corners.mean(axis=1)[:: -(-len(corners) // SAMPLE)]
@@ -72,7 +71,7 @@ def most_within(mesh: Mesh, reach: float) -> int:
 
 
 def meshes_of(worlds: Sequence[WorldSetup]) -> list[Mesh]:
-    """Every different mesh of the worlds."""
+    """Return every different mesh of the worlds."""
     walls = (wall for world in worlds for wall, _ in world.walls)
     return list(dict.fromkeys(wall for wall in walls if isinstance(wall, Mesh)))
 
@@ -80,23 +79,23 @@ def meshes_of(worlds: Sequence[WorldSetup]) -> list[Mesh]:
 def place_triangles(
     model: Any, worlds: Sequence[WorldSetup], precision: Precision, device: Any
 ) -> list[wp.Mesh]:
-    """Fill in the model's triangles; returns the search trees, which must outlive it."""
+    """Fill in the model's triangles; return the search trees, which the model needs."""
     types = device_structs(precision)
     meshes = meshes_of(worlds)
     tables = [TriangleTable.of(mesh) for mesh in meshes]
     first = np.cumsum([0, *(len(table.first) for table in tables)])
-    beside = np.cumsum([0, *(len(table.beside) for table in tables)])
+    adjacent = np.cumsum([0, *(len(table.adjacent) for table in tables)])
     trees = [_tree(table, device) for table in tables]
     rows = [
         {"a": a, "b": b, "c": c, "normal": normal, "first": start + begin, "count": count}
-        for table, begin in zip(tables, beside, strict=False)
+        for table, begin in zip(tables, adjacent, strict=False)
         for (a, b, c), normal, start, count in zip(
             table.corners, table.normals, table.first, table.count, strict=True
         )
     ]
     model.triangle = struct_array(types.Triangle, rows, device)
-    together = np.concatenate([np.zeros(0, dtype=int), *(table.beside for table in tables)])
-    model.beside = wp.array(together.astype(np.int32), dtype=int, device=device)
+    together = np.concatenate([np.zeros(0, dtype=int), *(table.adjacent for table in tables)])
+    model.adjacent = wp.array(together.astype(np.int32), dtype=int, device=device)
     facets = [
         {"bvh": trees[i].id, "first": first[i], "number": number, "count": count} if count else {}
         for world in worlds
@@ -113,7 +112,7 @@ def _tree(table: TriangleTable, device: Any) -> wp.Mesh:
 
 
 def _numbered(world: WorldSetup, meshes: list[Mesh]) -> Iterator[tuple[int, int, int]]:
-    """Of each wall: which mesh it is, its first triangle's number after the walls, how many it has."""
+    """Yield each wall's mesh index, number of the first triangle after the walls, and triangle count."""
     number = len(world.walls)
     for wall, _ in world.walls:
         count = wall.triangle_count

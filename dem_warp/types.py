@@ -1,7 +1,7 @@
-"""Device types: precision of a build; parameters of a contact, a wall and a world; flags of a world.
+"""Device types: precision and build of kernels, structs, flags of a world.
 
-Every struct is made for one floating type, so that the same kernel source serves the production precision and
-the float64 build used for verification.
+Every struct is made for one floating type: the same kernel source serves the production precision and the
+float64 build for verification.
 """
 
 import functools
@@ -18,37 +18,37 @@ from dem_warp.laws.library import parameters
 from dem_warp.laws.mechanism import Mechanisms
 
 FRAMES = 128
-"""Steps for which the places of the walls are kept: a power of two above the longest cycle."""
+"""Number of steps whose wall frames are stored: a power of two above the longest cycle."""
 
 
 class WorldFlag(IntFlag):
-    """Marks of what happened to a world while it ran; 0 is a healthy one."""
+    """Failures of a world; 0: none."""
 
     DIVERGED = 1
-    """A grain passed the speed limit of the scene (or is not finite)."""
+    """A grain is faster than the speed limit, or not finite."""
     NEIGHBOUR_OVERFLOW = 2
-    """A grain has more neighbours than the list holds."""
+    """A grain has more neighbours than its list holds."""
     LATE_REBUILD = 4
-    """A grain came farther than its lists allow for, so a contact may have been seen late."""
+    """A grain moved farther than its lists allow, so that a contact may be found late."""
 
 
-class Care(IntEnum):
-    """Frequency of the looks at the neighbour lists."""
+class CheckRate(IntEnum):
+    """Frequency of the checks of the neighbour lists."""
 
     USUAL = 0
-    """As seldom as the fastest grain allows."""
+    """As rare as the fastest grain allows."""
     CLOSE = 1
-    """Every other step: a grain at rest may be struck, or begin to roll, sooner than its lists allow for."""
+    """Every other step: a grain at rest may be hit, or begin to roll, sooner than its lists allow."""
     EVERY_STEP = 2
-    """Before every step, with lists made for it: slow, and nothing is seen late."""
+    """Before every step, with new lists: slow, but no contact is late."""
 
 
 @dataclass(frozen=True)
 class Precision:
     """Floating types of a build.
 
-    `mixed` is the production build: poses in float64, sphere positions as 32-bit integers of a power-of-two
-    length unit, forces in float32. `double` is float64 throughout.
+    `mixed` is for production: poses in float64, sphere positions as 32-bit integers of a power-of-two length
+    unit, forces in float32. `double` is float64 throughout.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Precision:
 
     @property
     def is_fixed_point(self) -> bool:
-        """True where sphere positions are integers of the length unit."""
+        """True if sphere positions are integers of the length unit."""
         return self.sphere is wp.vec4i
 
 
@@ -70,7 +70,7 @@ DOUBLE = Precision("double", wp.float64, wp.vec3d, wp.vec4d, wp.quatd, wp.vec4d)
 
 @dataclass(frozen=True)
 class Build:
-    """Key of compiled kernels; worlds of one build run in one batch, none changing another's bits."""
+    """Key of compiled kernels; worlds of one build can run in one batch."""
 
     precision: Precision
     sphere_count: int
@@ -90,12 +90,12 @@ class Build:
 
     @property
     def has_base_law(self) -> bool:
-        """True of contacts that have the base law and nothing beside."""
+        """True if contacts have the base law and no mechanism."""
         return not self.mechanisms and self.forms == BASE_FORMS
 
     @property
     def without_forces(self) -> "Build":
-        """The build of kernels that have nothing to do with forces."""
+        """Build of kernels without forces."""
         return replace(self, mechanisms=(), forms=BASE_FORMS)
 
 
@@ -103,7 +103,7 @@ PRECISIONS = {precision.name: precision for precision in (MIXED, DOUBLE)}
 
 
 def _with_fields(kinds: dict[str, Any]) -> Callable[[type], type]:
-    """Class decorator that adds fields, by name and kind."""
+    """Return a class decorator that adds fields, by name and kind."""
 
     def add(cls: type) -> type:
         cls.__annotations__ |= kinds
@@ -114,7 +114,7 @@ def _with_fields(kinds: dict[str, Any]) -> Callable[[type], type]:
 
 @functools.cache
 def device_structs(precision: Precision) -> SimpleNamespace:
-    """Structs in a precision, among them `Contact`, `ContactParams`, `Model`, `Grains` and `Neighbours`."""
+    """Return the structs in a precision by name."""
     real, vec3, vec4, sphere = precision.real, precision.vec3, precision.vec4, precision.sphere
 
     @wp.struct
@@ -131,17 +131,17 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     @wp.struct
     class Contact:
         normal: vec3  # unit vector from the partner to the grain
-        overlap: real  # d [m]; negative where the surfaces stand apart
+        overlap: real  # d [m]; negative for separated surfaces
         radius: real  # effective radius R* [m]
         mass: real  # effective mass m* [kg]
         velocity: vec3  # of the grain's surface relative to the partner's [m/s]
         spin: vec3  # of the grain relative to the partner [rad/s]
-        rolled: vec3  # of some laws: what the two spins slide [m/s], or the grain's own spin [rad/s]
+        rolled: vec3  # for some laws: sliding velocity of both spins [m/s], or the grain's own spin [rad/s]
         lever: vec3  # from the grain's centre to the contact [m]
         partner_lever: vec3  # from the centre of a grain that is its partner [m]
         mobility: real  # 1 / (m lever^2) of the grain and of a grain that is its partner, added [1/(kg m2)]
         time_step: real  # [s]
-        is_new: bool  # nothing is remembered from the step before
+        is_new: bool  # True: no memory from the step before
 
     @wp.struct
     class World:
@@ -153,27 +153,27 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         reach: real  # largest distance of two surfaces that act on each other [m]
         cell_rate: real  # cells per count of a sphere position
         speed_limit: real  # above it the world has diverged [m/s]
-        kept: real  # part of a grain's velocity that the air leaves it in a step; 1 without drag
+        drag_factor: real  # factor of the velocity by the air in a step; 1 without drag
         force_rate: real  # counts of a force on the weighed wall [1/N]
-        origin: wp.vec3d  # where sphere positions count from [m]
-        half_extent: wp.vec3d  # a grain further from the origin has left the domain [m]
-        most_found: int  # partners that a sphere may have; of its own, so that no other world changes it
-        most_listed: int  # entries that a grain's list may have
+        origin: wp.vec3d  # origin of sphere positions [m]
+        half_extent: wp.vec3d  # half sides of the domain about the origin [m]
+        found_limit: int  # most partners of a sphere; its own, so that no other world changes it
+        list_limit: int  # most entries of a grain's list
 
     @wp.struct
     class Wall:
-        kind: int  # as in the module walls
-        pair: int  # which contact parameters hold
+        kind: int  # constant of the module walls
+        pair: int  # number of its contact parameters
         axis: wp.vec3d  # unit axis or normal before the first motion
         radius: wp.float64  # of the profile's start [m]
         upper_radius: wp.float64  # of its end [m]
         length: wp.float64  # of the profile along the axis [m]
         reach: wp.float64  # from the wall's point to its farthest [m]
-        start_step: int  # the motion starts with this step
-        weighed: int  # 1: what grains put on it is summed up; 0: it is not
-        duration: wp.float64  # and ends after this time [s]
-        point: wp.vec3d  # the wall's point when the motion starts [m]
-        orientation: wp.quatd  # how far it had then turned
+        start_step: int  # first step of the motion
+        weighed: int  # 1: the force of grains on it is summed up; 0: it is not
+        duration: wp.float64  # of the motion [s]
+        point: wp.vec3d  # the wall's point at the start of the motion [m]
+        orientation: wp.quatd  # its orientation then
         velocity: wp.vec3d  # [m/s]
         spin: wp.vec3d  # [rad/s]
         amplitude: wp.vec3d  # of the vibration [m]
@@ -182,7 +182,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     @wp.struct
     class Frame:
         origin: wp.vec3d  # the wall's point [m]
-        rotation: wp.quatd  # how far it has turned
+        rotation: wp.quatd  # orientation
         axis: wp.vec3d  # unit axis or normal
         velocity: vec3  # of the wall's point [m/s]
         spin: vec3  # [rad/s]
@@ -202,19 +202,19 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         bvh: wp.uint64  # of the wall's mesh
         first: int  # index of its triangles
         number: int  # of the first triangle, counted on from the world's walls
-        count: int  # of triangles; 0 for a wall that is no mesh
+        count: int  # of triangles; 0 for a wall that is not a mesh
 
     @wp.struct
     class Model:
         world: wp.array(dtype=World)  # (worlds,)
         contact: wp.array(dtype=ContactParams)  # (worlds * pairs,)
         wall: wp.array(dtype=Wall)  # (worlds * walls,)
-        # where it stands in the steps about the present, (worlds * walls * FRAMES,)
+        # place in the steps about the present, (worlds * walls * FRAMES,)
         frame: wp.array(dtype=Frame)
         facets: wp.array(dtype=Facets)  # (worlds * walls,)
         triangle: wp.array(dtype=Triangle)  # of every different mesh
-        # its neighbours: number in the mesh, and bits of the corners that they share
-        beside: wp.array(dtype=int)
+        # its neighbours: number in the mesh, and bits of the shared corners
+        adjacent: wp.array(dtype=int)
         shape_spheres: wp.array(dtype=vec4)  # local centre and radius, (shapes * spheres,) [m]
         shape_sphere_count: wp.array(dtype=int)  # (shapes,)
         shape: wp.array(dtype=int)  # (grains,)
@@ -234,24 +234,24 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         spheres: wp.array(dtype=sphere)  # position in counts and radius [m], (grains * spheres,)
 
     @wp.struct
-    class Near:  # what a step looks at; written anew every few steps
+    class Near:  # candidates for contacts in the next steps
         count: wp.array(dtype=int)  # (grains,)
         item: wp.array(dtype=wp.vec2i)  # entries that may touch soon, and their slots, (grains * capacity,)
         speed: wp.array(dtype=float)  # of a grain's fastest point [m/s], (grains,)
-        wall_speed: wp.array(dtype=float)  # and of any wall [m/s], (worlds,)
-        pace: wp.array(dtype=float)  # speed that a grain may reach, struck by others [m/s], (grains,)
-        path: wp.array(dtype=real)  # farthest that a grain may come meanwhile [m], (grains,)
-        wall_path: wp.array(dtype=real)  # and any wall [m], (worlds,)
-        travel: wp.array(dtype=real)  # of a grain when this was written [m], (grains,)
-        moves: wp.array(dtype=int)  # 1: it used up much of the skin, (grains,)
+        wall_speed: wp.array(dtype=float)  # of the fastest wall [m/s], (worlds,)
+        pace: wp.array(dtype=float)  # speed that a grain may reach by collisions [m/s], (grains,)
+        path: wp.array(dtype=real)  # longest path of a grain in the next steps [m], (grains,)
+        wall_path: wp.array(dtype=real)  # longest path of a wall [m], (worlds,)
+        travel: wp.array(dtype=real)  # travel of a grain at the last check [m], (grains,)
+        moves: wp.array(dtype=int)  # 1: the grain used up much of the skin, (grains,)
         first: wp.array(dtype=int)  # first item of a grain, (grains,) on a CPU, else (0,)
-        afar: wp.array(dtype=int)  # 1: it waits far above all that move freely, and has no list, (grains,)
-        top: wp.array(dtype=float)  # highest point of these [m], inf if unknown, (worlds,)
+        afar: wp.array(dtype=int)  # 1: it waits far above all free grains, without a list, (grains,)
+        top: wp.array(dtype=float)  # highest point of the free grains [m], inf if unknown, (worlds,)
 
     @wp.struct
-    class Reactions:  # of contacts with grains before it, then of all, so far in a step; 0 between steps
+    class Reactions:  # of the contacts so far in a step, first those with earlier grains; 0 between steps
         force: wp.array(dtype=vec4)  # [N] and rolling torque [N m], (grains,) on a CPU, else (0,)
-        torque: wp.array(dtype=vec4)  # [N m], as long
+        torque: wp.array(dtype=vec4)  # [N m], of the same length
 
     @wp.struct
     class Neighbours:
@@ -259,9 +259,9 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         count: wp.array(dtype=int)  # (grains,)
         entry: wp.array(dtype=int)  # own sphere's number and partner, (grains * capacity,)
         history: wp.array(dtype=vec4)  # tangential displacement [m] and the step of it, one an entry
-        memory: wp.array(dtype=real)  # what the mechanisms remember of a contact, in SI units
+        memory: wp.array(dtype=real)  # values of a contact for mechanisms, in SI units
         rebuilt: wp.array(dtype=int)  # step of the last rebuild of all lists, (worlds,)
-        # path of a grain's farthest point since its partners were last searched [m], (grains,)
+        # path of a grain's farthest point since the last search of its partners [m], (grains,)
         travel: wp.array(dtype=real)
         pushed: wp.array(dtype=wp.int64)  # sum of its forces on the weighed wall, in counts, (grains,)
         near: Near
@@ -280,23 +280,13 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         found: wp.array(dtype=int)  # partners of a sphere, unsorted, (spheres * found_capacity,)
         found_count: wp.array(dtype=int)  # (spheres,)
         found_capacity: int
-        # lists while they are written, each with its histories and memories, (lists * capacity,)
+        # lists being written, with histories and memories, (lists * capacity,)
         drafts: wp.array(dtype=int)
         draft_history: wp.array(dtype=vec4)
         draft_memory: wp.array(dtype=real)
 
-    return SimpleNamespace(
-        Cells=Cells,
-        Contact=Contact,
-        Facets=Facets,
-        Frame=Frame,
-        ContactParams=ContactParams,
-        Triangle=Triangle,
-        World=World,
-        Wall=Wall,
-        Model=Model,
-        Grains=Grains,
-        Near=Near,
-        Reactions=Reactions,
-        Neighbours=Neighbours,
-    )
+    structs: tuple[Any, ...] = (
+        Cells, Contact, ContactParams, Facets, Frame, Grains, Model, Near, Neighbours, Reactions, Triangle,
+        Wall, World,
+    )  # fmt: skip
+    return SimpleNamespace(**{struct.cls.__name__: struct for struct in structs})

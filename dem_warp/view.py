@@ -1,4 +1,4 @@
-"""View of a world, as its scene has it between two chunks of steps."""
+"""State of a world for its scene, between two chunks of steps."""
 
 from dataclasses import dataclass
 
@@ -7,45 +7,35 @@ import numpy as np
 
 @dataclass(frozen=True)
 class WorldView:
-    """View of one world that a scene has between two chunks; arrays are by grain slot."""
+    """State of one world for its scene; arrays are by grain slot."""
 
     step: int
-    """Steps done."""
+    """Number of steps done."""
     time: float
-    """[s]."""
+    """Time [s]."""
     alive: np.ndarray
     released: np.ndarray
-    """Grains that move freely."""
+    """Grains that are in the world, and that move freely."""
     positions: np.ndarray
     velocities: np.ndarray
-    """[m], [m/s], shape (n, 3)."""
+    """Positions [m] and velocities [m/s], shape (n, 3)."""
     masses: np.ndarray
-    """[kg], shape (n,)."""
+    """Masses [kg], shape (n,)."""
     impulse: float
-    """Impulse that the grains have given to the weighed wall since the first step [N s]; see
-    `Solver.impulses`."""
+    """Impulse of the grains on the weighed wall since the first step [N s]; see `Solver.impulses`."""
     rms_speed: float
     fastest: float
-    """Root mean square, and largest, speed of the living grains [m/s]; 0 where none lives."""
+    """Root mean square and largest speed of the grains in the world [m/s]; 0 without grains."""
     highest: float
-    """Height of the highest centre of a living grain [m]; minus infinity where none lives."""
+    """Height of the highest centre of a grain in the world [m]; minus infinity without grains."""
 
 
 def overviews(
     positions: np.ndarray, velocities: np.ndarray, alive: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`WorldView.rms_speed`, `fastest` and `highest` of many worlds at once.
+    """Return `WorldView.rms_speed`, `fastest` and `highest` of many worlds, (worlds,) each.
 
-    Parameters
-    ----------
-    positions, velocities : (worlds, n, 3 or more) arrays
-        [m], [m/s]; what stands behind their three components is not looked at.
-    alive : (worlds, n) bool array
-
-    Returns
-    -------
-    rms_speeds, fastest, highest : (worlds,) arrays
-        [m/s], [m/s], [m]
+    `positions` [m] and `velocities` [m/s] are (worlds, n, 3 or more), `alive` is (worlds, n).
     """
     x, y, z = (velocities[:, :, axis] for axis in range(3))
     squares = np.where(alive, x * x + y * y + z * z, 0.0)

@@ -1,4 +1,4 @@
-"""Boundary surfaces and how they move: their description on the host.
+"""Boundary surfaces and their motions: the description on the host.
 
 A disc, a cylinder and a cone are swept by a straight profile that goes around the axis: from `radius`, at
 the point, to `upper_radius`, at `length` along the axis.
@@ -6,9 +6,12 @@ the point, to `upper_radius`, at `length` along the axis.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from dem_warp.parameters import Parameter, check_parameters
 
 Vector = tuple[float, float, float]
 
@@ -18,40 +21,74 @@ CONE = 2
 MESH = 3
 
 THINNEST = 1.0e-9
-"""Twice a triangle's area over its longest side squared, below which it has no plane."""
+"""Least value of twice a triangle's area over its longest side squared."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Rigid motion of a wall, which starts from wherever the wall then stands."""
+    """Rigid motion of a wall from its present place."""
 
     velocity: Vector = (0.0, 0.0, 0.0)
     """Velocity of the wall's own `point` [m/s]."""
     spin: Vector = (0.0, 0.0, 0.0)
     """Rotation about that point [rad/s]."""
     amplitude: Vector = (0.0, 0.0, 0.0)
-    """Of a vibration amplitude * sin(2 pi frequency t) on top, t from the start of the motion [m]."""
+    """Amplitude of an added vibration amplitude * sin(2 pi frequency t) from the start of the motion [m]."""
     frequency: float = 0.0
     """Frequency of the vibration [Hz]."""
     duration: float = math.inf
-    """After this time the wall stays where it then is [s]; by default the motion has no end."""
+    """Time after which the wall stays in place [s]. Default: the motion has no end."""
 
     def __post_init__(self) -> None:
         for name in ("velocity", "spin", "amplitude"):
             value = getattr(self, name)
             if np.shape(value) != (3,) or not np.all(np.isfinite(value)):
                 raise ValueError(f"Motion.{name}: must be three finite numbers, got {value!r}")
-        if not (math.isfinite(self.frequency) and self.frequency >= 0):
-            raise ValueError(f"Motion.frequency: must be finite and not negative, got {self.frequency!r}")
+        Parameter("Hz", at_least=0.0).check("Motion.frequency", self.frequency)
         if not self.duration > 0:
             raise ValueError(f"Motion.duration: must be positive [s], got {self.duration!r}")
         if any(self.amplitude) and self.frequency == 0:
             raise ValueError(f"Motion.frequency: must be positive with amplitude {self.amplitude!r}, got 0")
 
 
+class _Oriented:
+    """Surface with a point and a direction."""
+
+    point: Vector
+    oriented_by: ClassVar[str] = "direction"
+    """Name of the field with the direction."""
+    triangle_count: ClassVar[int] = 0
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+        kind, vector = type(self).__name__, self._direction
+        if np.shape(self.point) != (3,) or not np.all(np.isfinite(self.point)):
+            raise ValueError(f"{kind}.point: must be three finite numbers [m], got {self.point!r}")
+        if np.shape(vector) != (3,) or not 0 < float(np.linalg.norm(vector)) < math.inf:
+            rule = "must be a finite vector of non-zero length"
+            raise ValueError(f"{kind}.{self.oriented_by}: {rule}, got {vector!r}")
+
+    @property
+    def _direction(self) -> Vector:
+        vector: Vector = getattr(self, self.oriented_by)
+        return vector
+
+    @property
+    def axis(self) -> Vector:
+        """Unit vector of the direction."""
+        x, y, z = (
+            float(c) for c in np.asarray(self._direction, dtype=float) / np.linalg.norm(self._direction)
+        )
+        return x, y, z
+
+
+_Length = Annotated[float, Parameter("m", above=0.0)]
+_Radius = Annotated[float, Parameter("m", at_least=0.0)]
+
+
 @dataclass(frozen=True)
-class Plane:
-    """Infinite plane; grains stand on the side its normal points to."""
+class Plane(_Oriented):
+    """Infinite plane; grains are on the side of its normal."""
 
     point: Vector = (0.0, 0.0, 0.0)
     """A point of the plane [m]."""
@@ -59,51 +96,35 @@ class Plane:
     """Direction of the normal; scaled to unit length on the device."""
 
     kind = PLANE
-    triangle_count = 0
+    oriented_by = "normal"
     radius = upper_radius = length = 0.0
     reach = math.inf
 
-    def __post_init__(self) -> None:
-        _check_vectors(self, "point", "normal")
-
-    @property
-    def axis(self) -> Vector:
-        """Unit normal."""
-        return _unit(self.normal)
-
 
 @dataclass(frozen=True)
-class Disc:
-    """Thin round plate, touched from both sides and at its rim, with a round hole if one is asked for."""
+class Disc(_Oriented):
+    """Thin round plate, touched from both sides and at its rim, with an optional round hole."""
 
     point: Vector
-    """Its centre [m]."""
+    """Centre [m]."""
     normal: Vector
-    radius: float
-    inner_radius: float = 0.0
-    """Radii of the plate and of the hole in its middle [m]."""
+    radius: _Length
+    inner_radius: _Radius = 0.0
+    """Radius of the hole in the middle [m]."""
 
     kind = CONE
-    triangle_count = 0
+    oriented_by = "normal"
     length = 0.0
 
     def __post_init__(self) -> None:
-        _check_vectors(self, "point", "normal")
-        _check_positive(self, "radius")
-        if not 0 <= self.inner_radius < self.radius:
-            raise ValueError(
-                f"Disc.inner_radius: must be from 0 to below the radius {self.radius!r} [m], "
-                f"got {self.inner_radius!r}"
-            )
-
-    @property
-    def axis(self) -> Vector:
-        """Unit normal."""
-        return _unit(self.normal)
+        super().__post_init__()
+        if self.inner_radius >= self.radius:
+            rule = f"must be below the radius {self.radius!r} [m]"
+            raise ValueError(f"Disc.inner_radius: {rule}, got {self.inner_radius!r}")
 
     @property
     def upper_radius(self) -> float:
-        """End of the profile [m]."""
+        """Radius at the end of the profile [m]."""
         return self.inner_radius
 
     @property
@@ -113,32 +134,22 @@ class Disc:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class Cylinder(_Oriented):
     """Open, infinitely thin cylinder surface, touched from inside, from outside and at both rims."""
 
     point: Vector
-    """Centre of its lower rim [m]."""
-    radius: float
-    length: float
-    """[m]."""
+    """Centre of the lower rim [m]."""
+    radius: _Length
+    length: _Length
+    """Length along the axis [m]."""
     direction: Vector = (0.0, 0.0, 1.0)
     """Direction of the axis, from the lower rim to the upper."""
 
     kind = CYLINDER
-    triangle_count = 0
-
-    def __post_init__(self) -> None:
-        _check_vectors(self, "point", "direction")
-        _check_positive(self, "radius", "length")
-
-    @property
-    def axis(self) -> Vector:
-        """Unit axis."""
-        return _unit(self.direction)
 
     @property
     def upper_radius(self) -> float:
-        """End of the profile [m]."""
+        """Radius at the end of the profile [m]."""
         return self.radius
 
     @property
@@ -148,39 +159,29 @@ class Cylinder:
 
 
 @dataclass(frozen=True)
-class Cone:
+class Cone(_Oriented):
     """Open, infinitely thin frustum of a cone, touched from inside, from outside and at both rims.
 
-    A sphere meets it in its nearest point only. So a sphere too large for the narrow end, which in truth
+    A sphere touches it at its nearest point only: a sphere too large for the narrow end, which in reality
     touches all around, is held from one side at a time.
     """
 
     point: Vector
-    """Centre of its lower rim [m]."""
-    radius: float
-    upper_radius: float
-    """Radii of the lower rim and of the upper; one of them may be 0, a tip [m]."""
-    length: float
+    """Centre of the lower rim [m]."""
+    radius: _Radius
+    upper_radius: _Radius
+    """Radii of the lower and the upper rim [m]; one of them may be 0, a tip."""
+    length: _Length
     """Height along the axis [m]."""
     direction: Vector = (0.0, 0.0, 1.0)
     """Direction of the axis, from the lower rim to the upper."""
 
     kind = CONE
-    triangle_count = 0
 
     def __post_init__(self) -> None:
-        _check_vectors(self, "point", "direction")
-        _check_positive(self, "length")
-        radii = (self.radius, self.upper_radius)
-        if not (all(math.isfinite(r) and r >= 0 for r in radii) and any(radii)):
-            raise ValueError(
-                f"Cone.radius, upper_radius: must be finite, not negative and not both 0 [m], got {radii!r}"
-            )
-
-    @property
-    def axis(self) -> Vector:
-        """Unit axis."""
-        return _unit(self.direction)
+        super().__post_init__()
+        if self.radius == self.upper_radius == 0:
+            raise ValueError("Cone.radius, upper_radius: must not both be 0 [m]")
 
     @property
     def reach(self) -> float:
@@ -197,9 +198,9 @@ class Mesh:
     """
 
     vertices: np.ndarray
-    """[m], read-only, shape (n, 3)."""
+    """Corners [m], read-only, shape (n, 3)."""
     faces: np.ndarray
-    """Three vertices of each triangle, either way around, read-only, shape (m, 3)."""
+    """Three vertices of each triangle, in either order, read-only, shape (m, 3)."""
     point: Vector = (0.0, 0.0, 0.0)
     """Point that the mesh turns about [m]."""
 
@@ -225,16 +226,16 @@ class Mesh:
             np.linalg.norm([b - a, c - a, c - b], axis=2),
         )
         if bad := np.flatnonzero(area <= THINNEST * side.max(axis=0) ** 2).tolist():
-            raise ValueError(f"Mesh.faces: must span an area, triangles {bad[:5]} do not")
+            raise ValueError(f"Mesh.faces: each must have an area, got triangles {bad[:5]} without")
         for name, array in (("vertices", vertices), ("faces", faces)):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 
     @classmethod
     def tube(cls, radius: float, height: float, segments: int) -> "Mesh":
-        """Upright open tube about the origin, its cross-section that of a round one of this radius [m]."""
+        """Return an upright open tube about the origin with the cross-section of a circle of a radius [m]."""
         if segments < 3:
-            raise ValueError(f"Mesh.tube: must have 3 segments or more, got {segments!r}")
+            raise ValueError(f"Mesh.tube.segments: must be 3 or more, got {segments!r}")
         turn = 2.0 * np.pi / segments
         corner = radius * np.sqrt(turn / np.sin(turn))
         lower = np.arange(segments)
@@ -246,10 +247,10 @@ class Mesh:
 
     @classmethod
     def plates(cls, corners: ArrayLike) -> "Mesh":
-        """Flat plates of four corners each, (k, 4, 3) in the order around them [m]."""
+        """Return flat plates of four corners each, (k, 4, 3) in the order around them [m]."""
         vertices = np.asarray(corners, dtype=float)
         if vertices.ndim != 3 or vertices.shape[1:] != (4, 3):
-            raise ValueError(f"Mesh.plates: must have shape (k, 4, 3), got {vertices.shape}")
+            raise ValueError(f"Mesh.plates.corners: must have shape (k, 4, 3), got {vertices.shape}")
         first = 4 * np.arange(len(vertices))[:, None]
         faces = np.hstack([first + np.array(triangle) for triangle in ((0, 1, 2), (0, 2, 3))])
         return cls(vertices.reshape(-1, 3), faces.reshape(-1, 3))
@@ -266,24 +267,3 @@ class Mesh:
 
 
 Wall = Plane | Disc | Cylinder | Cone | Mesh
-
-
-def _check_vectors(wall: object, place: str, direction: str) -> None:
-    kind = type(wall).__name__
-    point, vector = getattr(wall, place), getattr(wall, direction)
-    if np.shape(point) != (3,) or not np.all(np.isfinite(point)):
-        raise ValueError(f"{kind}.{place}: must be three finite numbers [m], got {point!r}")
-    if np.shape(vector) != (3,) or not 0 < float(np.linalg.norm(vector)) < math.inf:
-        raise ValueError(f"{kind}.{direction}: must be a finite vector of non-zero length, got {vector!r}")
-
-
-def _check_positive(wall: object, *names: str) -> None:
-    for name in names:
-        value = getattr(wall, name)
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{type(wall).__name__}.{name}: must be positive and finite [m], got {value!r}")
-
-
-def _unit(vector: Vector) -> Vector:
-    x, y, z = (float(c) for c in np.asarray(vector, dtype=float) / np.linalg.norm(vector))
-    return x, y, z

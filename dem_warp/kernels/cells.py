@@ -1,8 +1,8 @@
-"""Spheres near each other, found in a hash grid of cells: each occupied one is a run of spheres in memory.
+"""Search of near spheres in a hash grid of cells: each bucket is a run of spheres in memory.
 
-The grid wraps around in each direction; two cells of one bucket are told apart by the distance of their
-spheres. Only worlds whose `stale` flag is set are searched. Places in memory are given out in a race, and the
-partners of a sphere are found in any order; `neighbours` sorts them.
+The grid wraps around in each direction; the distance of spheres separates two cells of one bucket. Only
+worlds whose `stale` flag is set are searched. Places in memory are assigned in a race, and partners of a
+sphere are found in any order; `neighbours` sorts them.
 """
 
 import functools
@@ -24,7 +24,7 @@ OWN_CELL = CELLS_AROUND // 2
 
 @functools.cache
 def cell_kernels(build: Build) -> SimpleNamespace:
-    """`bin_spheres`, `open_buckets`, `fill_buckets` and `search`, in their order of launch."""
+    """Return `bin_spheres`, `open_buckets`, `fill_buckets` and `search`, in their order of launch."""
     precision = build.precision
     real = precision.real
     types = device_structs(precision)
@@ -79,7 +79,7 @@ def cell_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def room_for(cells: Cells, thread: int, w: int, size: int) -> int:
-        """First of `size` places of a world; the lanes of a warp, if all of that world, ask at once."""
+        """Reserve `size` places of a world and return the first; a warp of one world reserves together."""
         through = running_sum(size)
         of_warp = from_lane(through, WARP - 1)
         begin = int(0)
@@ -93,7 +93,7 @@ def cell_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module, grid_stride=False)
     def open_buckets(model: Model, stale: wp.array(dtype=int), cells: Cells):
-        """Gives each occupied bucket its place; which place is a race, and nothing depends on it."""
+        """Assign each occupied bucket a place, in a race; no result depends on it."""
         i = wp.tid()
         w = wp.min(i // (spheres_each * model.grain_count), stale.shape[0] - 1)
         size = int(0)
@@ -116,7 +116,7 @@ def cell_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def append(cells: Cells, i: int, partner: int):
-        """Adds a partner to those of sphere `i`, in any order; past the capacity only the count goes on."""
+        """Add a partner of sphere `i`; past the capacity only the count grows."""
         n = cells.found_count[i]
         if n < cells.found_capacity:
             cells.found[i * cells.found_capacity + n] = partner
@@ -124,7 +124,7 @@ def cell_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def append_shared(cells: Cells, i: int, partner: int):
-        """The same where other threads do so, too."""
+        """Add a partner of sphere `i` while other threads may do so too."""
         n = wp.atomic_add(cells.found_count, i, 1)
         if n < cells.found_capacity:
             cells.found[i * cells.found_capacity + n] = partner
@@ -133,14 +133,14 @@ def cell_kernels(build: Build) -> SimpleNamespace:
     def append_triangles(
         model: Model, cells: Cells, i: int, w: int, k: int, position: wp.vec3d, reach: real, step: int
     ):
-        """Adds the triangles of wall `k` that are near to sphere `i`."""
+        """Add the triangles of wall `k` that are near to sphere `i`."""
         wall = w * walls_each + k
         facets = model.facets[wall]
         if facets.count == 0:
             return
         q = walls.to_mesh(walls.frame_of(model, wall, step), position)
         near = wp.float64(reach)
-        # the tree's boxes are in float32, rounded by some 1e-7 of the mesh's size
+        # the tree's boxes are in float32, with an error of about 1e-7 of the mesh's size
         center = wp.vec3(float(q[0]), float(q[1]), float(q[2]))
         half = float(reach) + 1.0e-6 * float(model.wall[wall].reach)
         corner = wp.vec3(half, half, half)
@@ -153,13 +153,12 @@ def cell_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def search(model: Model, grains: Grains, stale: wp.array(dtype=int), near: Near, cells: Cells):
-        """Partners of each sphere.
+        """Find the partners of each sphere.
 
-        Threads follow the buckets, so that neighbouring threads read the same memory. One thread alone meets
-        each pair once: in its own bucket, and in the half of the buckets ahead of it; the earlier grain alone
-        has the other in its list. Many at once find each its own partners, so that nobody has to wait for a
-        place in another one's list. Where some grains have moved, these alone look around, for those that
-        have not as well; of one thread the earlier of two for both.
+        Threads follow the buckets, so that neighbouring threads read the same memory. A single thread finds
+        each pair once, in its own bucket and the half of the buckets after it; only the earlier grain lists
+        the other. Threads of a GPU each find their own partners, without waiting for another list. If only
+        some grains have moved, these alone search, also for the others.
         """
         slot = wp.tid()
         w = slot // (spheres_each * model.grain_count)

@@ -1,6 +1,7 @@
-"""One entry of a grain's neighbour list: is it near, and what does it do.
+"""One entry of a grain's neighbour list: its distance and its contact force.
 
-An entry names one of the grain's spheres and a partner: a sphere of another grain or, numbered after, a wall.
+An entry has one of the grain's spheres and a partner: a sphere of another grain or, with higher numbers, a
+wall or a triangle.
 """
 
 import functools
@@ -18,7 +19,7 @@ from dem_warp.types import Build, device_structs
 
 @functools.cache
 def contact_functions(build: Build) -> SimpleNamespace:
-    """`nears`, `is_free` and `contact` of one build."""
+    """Return `nears`, `is_free` and `contact` of one build."""
     precision = build.precision
     real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
     Sphere = precision.sphere
@@ -30,8 +31,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     is_apart = acts_apart(build.mechanisms)
     turning = build.forms.partner_turning
     memory_each = wp.constant(memory_size(build.mechanisms, build.forms))
-    # the lanes of a warp that meet nothing wait for the others: let them load and work as if, so that nobody
-    # waits for the distance before the rest is loaded
+    # lanes of a warp without contact wait for the others anyway: all load at once, before distances are known
     is_speculative = build.cooperative and build.has_base_law and not build.has_mesh
     walls = wall_functions(build.without_forces)
     spheres_each = wp.constant(build.sphere_count)
@@ -43,7 +43,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     def nears(
         model: Model, world: World, grains: Grains, w: int, g: int, entry: int, margin: real, step: int
     ) -> bool:
-        """Tell whether the two partners of an entry are nearer to each other than a margin [m]."""
+        """Return True if the distance of an entry's two partners is below a margin [m]."""
         partner = entry & mask
         wall_base = model.grain_count * spheres_each
         a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> bits))
@@ -57,7 +57,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def is_free(model: Model, neighbours: Neighbours, w: int, item: int, step: int) -> bool:
-        """Tell whether the partner in an item of `near` is a grain that moves freely."""
+        """Return True if the partner in an item of `near` is a grain that moves freely."""
         partner = load_pair(neighbours.near.item, item)[0] & mask
         j = partner // spheres_each
         return j < model.grain_count and step >= model.release_step[w * model.grain_count + j]
@@ -74,14 +74,14 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def lever_of(grains: Grains, world: World, g: int, sphere: Sphere, to_contact: vec3) -> vec3:
-        """From a grain's centre to a contact, which lies `to_contact` from the centre of its sphere."""
+        """Return the vector from a grain's centre to a contact at `to_contact` from its sphere's centre."""
         return pack.difference(sphere, pack.load_sphere(grains.center, g), world) + to_contact
 
     @wp.func
     def meet_sphere(
         grains: Grains, world: World, contact: Contact, j: int, a: Sphere, b: Sphere, d: vec3
     ) -> Contact:
-        """Geometry of a contact with a sphere of grain `j`, and its motion relative to that grain at rest."""
+        """Set the geometry of a contact with a sphere of grain `j`, and the motion of `j`."""
         distance = wp.length(d)
         ra = pack.last(a)
         rb = pack.last(b)
@@ -102,7 +102,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def add_motion(grains: Grains, contact: Contact, g: int) -> Contact:
-        """Adds the motion of the grain itself to that of its partner."""
+        """Add the motion of the grain itself to that of its partner."""
         contact.velocity += surface_velocity(grains, g, contact.lever)
         contact.spin += spin_of(grains, g)
         if wp.static(turning == "own lever"):
@@ -113,7 +113,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def torques(contact: Contact, torque: vec3):
-        """Torque on the grain, and the opposite of that on its partner [N m], of what the law gives."""
+        """Return the torque on the grain, and the opposite of that on its partner [N m], from the law's."""
         if wp.static(turning == "own lever"):
             return wp.cross(contact.lever, torque), wp.cross(contact.partner_lever, torque)
         if wp.static(turning == "alike"):
@@ -122,7 +122,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def joined(model: Model, w: int, entry: int, other: int) -> bool:
-        """Tell whether the partners of two entries are triangles that share a corner, the first being one."""
+        """Return True if a triangle, the partner of the first entry, shares a corner with the other."""
         wall_base = model.grain_count * spheres_each
         return walls.joined(model, w, (entry & mask) - wall_base, (other & mask) - wall_base)
 
@@ -130,7 +130,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     def touches_triangle(
         model: Model, world: World, grains: Grains, w: int, g: int, entry: int, step: int
     ) -> bool:
-        """Tell whether the triangle of an entry has a contact with the entry's sphere."""
+        """Return True if the triangle of an entry has a contact with the entry's sphere."""
         a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> bits))
         reach = pack.last(a)
         if wp.static(is_apart):
@@ -143,10 +143,10 @@ def contact_functions(build: Build) -> SimpleNamespace:
         model: Model, world: World, grains: Grains, neighbours: Neighbours,
         w: int, g: int, slot: int, step: int,
     ):  # fmt: skip
-        """Lets a contact that has passed from one triangle of a mesh to the next go on with its history.
+        """Continue the history of a contact that has moved from one triangle of a mesh to the next.
 
-        The sphere touched the other one in the step before and has left it now. Nobody writes to an entry
-        that does not touch, so it may be read.
+        The sphere touched the other triangle in the step before, but not now. No thread writes to an entry
+        without contact, so it may be read.
         """
         entry = neighbours.entry[slot]
         first = g * neighbours.capacity
@@ -166,7 +166,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
         model: Model, world: World, grains: Grains, neighbours: Neighbours,
         w: int, g: int, slot: int, step: int,
     ):  # fmt: skip
-        """Tangential displacement [m] of a contact in the step before, and whether there was no contact."""
+        """Return the tangential displacement [m] of a contact, and True if the contact is new."""
         if wp.static(build.has_mesh):
             first_triangle = model.grain_count * spheres_each + walls_each
             is_triangle = neighbours.entry[slot] & mask >= first_triangle
@@ -181,7 +181,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def react(neighbours: Neighbours, g: int, force: vec3, torque: vec3, rolling: real):
-        """Sets the opposite of a force and torque, and a rolling torque, on a grain whose turn is to come."""
+        """Add the opposite of a force and torque, and a rolling torque, to a later grain."""
         f = pack.load_vec4(neighbours.reactions.force, g)
         t = pack.load_vec4(neighbours.reactions.torque, g)
         pack.store_vec4(neighbours.reactions.force, g, f + vec4(-force[0], -force[1], -force[2], rolling))
@@ -189,9 +189,9 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def weigh(model: Model, world: World, neighbours: Neighbours, wall: int, g: int, force: vec3):
-        """Adds the opposite of a force to what a grain has given to the weighed wall.
+        """Add the opposite of a force to a grain's sum on the weighed wall.
 
-        Counts have the same sum in any order; a sum for each grain, as one for all would have to wait.
+        Integer counts have the same sum in any order; one sum for all grains would be slow.
         """
         if model.wall[wall].weighed != 0:
             wp.atomic_add(neighbours.pushed, g, -wp.int64(wp.rint(force[2] * world.force_rate)))
@@ -201,10 +201,9 @@ def contact_functions(build: Build) -> SimpleNamespace:
         model: Model, world: World, grains: Grains, neighbours: Neighbours,
         w: int, g: int, item: int, step: int,
     ):  # fmt: skip
-        """Force [N], torque and rolling torque [N m] of an item of `near`, none if the two do not meet.
+        """Return force [N], torque and rolling torque [N m] of an item of `near`, 0 without contact.
 
-        Updates the history of the contact, what the weighed wall has borne and, on a CPU, the reactions of
-        the partner.
+        Update the history of the contact, the sum on the weighed wall and, on a CPU, the partner's reactions.
         """
         near = load_pair(neighbours.near.item, item)
         entry = near[0]

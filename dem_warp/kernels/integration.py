@@ -1,4 +1,4 @@
-"""Motion of one rigid grain over one step."""
+"""Rotation of one rigid grain over one step."""
 
 import functools
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from dem_warp.types import Precision
 
 @functools.cache
 def integration_functions(precision: Precision) -> SimpleNamespace:
-    """`turn(orientation, spin, torque, inertia, rolling, time_step, holds)` in one precision."""
+    """Return `turn` and `rounded` in one precision."""
     real, vec3, quat = precision.real, precision.vec3, precision.quat
 
     @wp.func
@@ -20,7 +20,7 @@ def integration_functions(precision: Precision) -> SimpleNamespace:
 
     @wp.func
     def inverse_root(x: wp.float64) -> wp.float64:
-        """1 / sqrt(x) near 1; in the mixed precision a float32 root and a step of Newton's, good to 1e-14."""
+        """Return 1 / sqrt(x) near 1; in mixed precision a float32 root and a Newton step, exact to 1e-14."""
         if wp.static(precision.is_fixed_point):
             guess = wp.float64(1.0 / wp.sqrt(float(x)))
             return guess * (wp.float64(1.5) - wp.float64(0.5) * x * guess * guess)
@@ -36,12 +36,11 @@ def integration_functions(precision: Precision) -> SimpleNamespace:
         time_step: real,
         holds: real,
     ):
-        """Orientation and spin [rad/s] after a step under `torque` and rolling resistance `rolling` [N m].
+        """Return orientation and spin [rad/s] after a step under `torque` and rolling resistance [N m].
 
-        The angular momentum takes the torque and is then carried unchanged, while the body turns about the
-        spin that it has half a step on (an explicit midpoint rule): free of torque, the momentum is conserved
-        to rounding and the energy to second order. The turn is the Cayley map of the midpoint spin, a unit
-        quaternion by construction.
+        The torque changes the angular momentum, which is then constant while the body turns about the spin at
+        half the step (an explicit midpoint rule): without torque, the momentum is conserved to rounding and
+        the energy to second order. The turn is the Cayley map of the midpoint spin, a unit quaternion.
         """
         q = rounded(orientation)
         body_spin = wp.quat_rotate_inv(q, spin)

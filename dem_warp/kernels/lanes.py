@@ -9,10 +9,10 @@ WARP = 32
 """Lanes of a warp."""
 
 ALL_LANES = wp.constant(-1)
-"""Answer of `lanes_with` when all lanes of a GPU warp have it."""
+"""Result of `lanes_with` if the value is True in all lanes of a GPU warp."""
 
 BLOCK = 128
-"""Threads of a block, that share memory."""
+"""Threads of a block, with shared memory."""
 
 SHARED = """
 #if defined(__CUDA_ARCH__)
@@ -33,7 +33,7 @@ PREFETCH = """
 
 
 def shared(kind: str, per_warp: int) -> str:
-    """Code of a function (index, value, write) on the `per_warp` cells of shared memory of a warp."""
+    """Return the code of a function (index, value, write) on `per_warp` cells of a warp's shared memory."""
     return SHARED.format(kind=kind, size=per_warp * BLOCK // WARP, part=per_warp)
 
 
@@ -110,7 +110,7 @@ def load_pair(a: wp.array(dtype=wp.vec2i), i: int) -> wp.vec2i: ...
 
 @functools.cache
 def prefetcher(kind: Any) -> Any:
-    """Function (array of `kind`, index) that calls for an element which will be read a while later."""
+    """Return a function (array of `kind`, index) that prefetches an element."""
 
     @wp.func_native(PREFETCH)
     def prefetch(a: wp.array(dtype=kind), i: int): ...

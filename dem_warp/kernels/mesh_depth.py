@@ -14,7 +14,7 @@ def mesh_depth(
     # state out
     depths_out: wp.array(dtype=wp.float32),
 ):
-    """Distance of each point to the nearest face, positive inside (by the winding number)."""
+    """Set the distance of each point to the nearest face, positive inside (by the winding number)."""
     index = wp.tid()
     point = points_in[index]
     query = wp.mesh_query_point_sign_winding_number(mesh, point, _FAR)

@@ -1,7 +1,7 @@
 """Motion of the grains under the forces of a step, and the new places of their spheres.
 
-On a GPU each grain has some lanes, which share out its spheres. On a CPU the grains of a block move at once:
-their numbers stand side by side, and the compiler takes turns of a loop without branches together.
+On a GPU the lanes of a grain share its spheres. On a CPU the grains of a block move at once: their numbers
+are contiguous, so that the compiler vectorises a loop without branches.
 """
 
 import functools
@@ -15,19 +15,19 @@ from dem_warp.types import Build, WorldFlag, device_structs
 
 DIVERGED = wp.constant(int(WorldFlag.DIVERGED))
 LEAVING = wp.constant(-2)
-"""State of a grain whose spheres have yet to be taken out of both copies of the state."""
+"""State of a grain whose spheres must still be removed from both copies of the state."""
 BLOCK = 8
-"""Grains that a CPU moves at once: as many numbers of 64 bits as its longest instructions take."""
+"""Grains that a CPU moves at once: the 64-bit numbers of its longest vector instructions."""
 
 
 @functools.cache
 def motion_functions(build: Build) -> SimpleNamespace:
-    """`move`, `move_world`, `spread_spheres`, `clear_spheres` and `rounded` of one build."""
+    """Return `move`, `move_world`, `spread_spheres`, `clear_spheres` and `rounded` of one build."""
     precision = build.precision
     real, vec3, vec4, quat, sphere = (
         precision.real, precision.vec3, precision.vec4, precision.quat, precision.sphere,
     )  # fmt: skip
-    # of the grains of a block, a column each
+    # a column for each grain of a block
     singles, triples = wp.types.vector(BLOCK, real), wp.types.matrix((3, BLOCK), real)
     places, turns = wp.types.matrix((3, BLOCK), wp.float64), wp.types.matrix((4, BLOCK), wp.float64)
     types = device_structs(precision)
@@ -40,7 +40,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
     def spread_spheres(
         model: Model, world: World, out: Grains, g: int, center: sphere, q: quat, lane: int, lanes: int
     ):
-        """Sphere positions of a grain from its centre and orientation, a sphere a lane."""
+        """Set the sphere positions of a grain from its centre and orientation, a sphere per lane."""
         size = pack.last(center)
         shape = model.shape[g]
         for i in range(lane, model.shape_sphere_count[shape], lanes):
@@ -52,7 +52,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def clear_spheres(model: Model, out: Grains, g: int):
-        """Takes a grain's spheres out: compared with a radius that is not a number, nothing touches."""
+        """Remove a grain's spheres: with NaN as radius, nothing touches them."""
         for i in range(spheres_each):
             none = pack.load_sphere(out.spheres, g * spheres_each + i)
             none[3] = pack.no_radius()
@@ -69,10 +69,10 @@ def motion_functions(build: Build) -> SimpleNamespace:
         world: World, velocity: vec3, spin: vec3, turned: wp.quatd, mass: real, inertia: vec3,
         force: vec3, torque: vec3, rolling: real,
     ):  # fmt: skip
-        """Velocity, orientation and spin of a grain that moves freely, a step later."""
+        """Return velocity, orientation and spin of a free grain after a step."""
         dt = world.time_step
         velocity += (force / mass + world.gravity) * dt
-        velocity *= world.kept  # last, where a factor of 1 changes no bit
+        velocity *= world.drag_factor  # last, where a factor of 1 changes no bit
         turned, spin = integration.turn(turned, spin, torque, inertia, rolling, dt, world.rolling_holds)
         return velocity, turned, spin
 
@@ -85,7 +85,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def fastest(velocity: vec3, spin: vec3, reach: real) -> real:
-        """Speed [m/s] that no point of a grain surpasses."""
+        """Return a bound of the speed of a grain's points [m/s]."""
         return wp.length(velocity) + wp.length(spin) * reach
 
     @wp.func
@@ -95,7 +95,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
         position: wp.vec3d, velocity: vec3, turned: wp.quatd, spin: vec3, mass: real, speed: real,
         lane: int, lanes: int,
     ):  # fmt: skip
-        """Stores the new state of a grain: the first lane its pose, each some spheres."""
+        """Store the new state of a grain: the first lane its pose, each lane some spheres."""
         center = pack.pack(position, pack.last(pack.load_sphere(grains.center, g)), world)
         if lane == 0:
             out.position[g] = position
@@ -116,7 +116,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
         flags: wp.array(dtype=int), w: int, g: int, step: int, force: vec3, torque: vec3, rolling: real,
         lane: int, lanes: int,
     ):  # fmt: skip
-        """New pose, velocity, spin and spheres of a grain; every lane works it out, the first stores it."""
+        """Compute the new pose, velocity, spin and spheres of a grain in every lane, and store them."""
         world = model.world[w]
         v4 = pack.load_vec4(grains.velocity, g)
         w4 = pack.load_vec4(grains.spin, g)
@@ -138,7 +138,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def taken(neighbours: Neighbours, g: int):
-        """Force with the rolling torque, and torque, that a grain has got; none are left."""
+        """Return force with rolling torque, and torque, of a grain, and reset them."""
         force = pack.load_vec4(neighbours.reactions.force, g)
         torque = pack.load_vec4(neighbours.reactions.torque, g)
         pack.store_vec4(neighbours.reactions.force, g, vec4())
@@ -147,7 +147,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def gathered(model: Model, grains: Grains, neighbours: Neighbours, first: int, count: int):
-        """`count` grains from `first` on, side by side, with the forces that they have got."""
+        """Gather `count` grains from `first` on in columns, with their forces."""
         position = places()
         turned = turns()
         velocity = triples()
@@ -185,9 +185,9 @@ def motion_functions(build: Build) -> SimpleNamespace:
         world: World, free: int, position: places, turned: turns, velocity: triples, spin: triples,
         force: triples, torque: triples, inertia: triples, mass: singles, rolling: singles, reach: singles,
     ):  # fmt: skip
-        """State of a block a step later, and speeds of its grains; bits of `free` tell who moves freely."""
+        """Return the state of a block after a step, and its speeds; bits of `free` mark free grains."""
         k = int(0)
-        while k < wp.static(BLOCK):  # a compiler cannot take turns of Warp's loops over ranges together
+        while k < wp.static(BLOCK):  # a compiler cannot vectorise Warp's loops over ranges
             v, q, s = pushed(
                 world,
                 vec3(velocity[0, k], velocity[1, k], velocity[2, k]),
@@ -218,7 +218,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
         model: Model, world: World, grains: Grains, out: Grains, neighbours: Neighbours,
         alive: wp.array(dtype=int), flags: wp.array(dtype=int), w: int, first: int, count: int, step: int,
     ):  # fmt: skip
-        """New poses, velocities, spins and spheres of `count` grains from `first` on."""
+        """Move `count` grains from `first` on."""
         position, turned, velocity, spin, force, torque, inertia, mass, rolling, reach = gathered(
             model, grains, neighbours, first, count
         )
@@ -248,7 +248,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
         model: Model, grains: Grains, out: Grains, neighbours: Neighbours, alive: wp.array(dtype=int),
         flags: wp.array(dtype=int), w: int, step: int,
     ):  # fmt: skip
-        """Moves all grains of a world, block by block, under the forces that they have got."""
+        """Move all grains of a world, block by block."""
         world = model.world[w]
         for start in range(0, model.grain_count, wp.static(BLOCK)):
             first = w * model.grain_count + start

@@ -1,12 +1,12 @@
-"""Neighbour lists: every sphere of another grain, and every wall, nearer to a sphere than the skin.
+"""Neighbour lists: every sphere of another grain, and every wall, within the skin of a sphere.
 
-On a GPU two grains have each other in their lists; on a CPU, which works each pair out once, the earlier one
-has the other. Walls are numbered after the spheres of their world.
+On a GPU two grains list each other; on a CPU, which computes each pair once, the earlier one lists the other.
+Walls are numbered after the spheres of their world.
 
-A list is sorted by the own sphere's number and then by the partner's, so its order, and with it the order of
-a grain's force sum, depends on the grains alone: not on cells, skin, moment of the rebuild or batch.
-Only worlds whose `stale` flag is set are rebuilt, all lists or those that grains which have moved call for.
-A new list is drafted, with the histories of the old one, and then put into its place.
+A list is sorted by the own sphere's number and then by the partner's. So its order, and the order of a
+grain's force sum, depends on the grains alone: not on cells, skin, time of the rebuild or batch. Only worlds
+whose `stale` flag is set are rebuilt: all lists, or those affected by moved grains. A new list is written as
+a draft, with the histories of the old one, and then copied into place.
 """
 
 import functools
@@ -25,17 +25,17 @@ from dem_warp.types import Build, WorldFlag, device_structs
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
 
 NO_ENTRY = wp.constant(2**31 - 1)
-"""Above every entry."""
+"""Number above every entry."""
 
 
 def list_threads(build: Build) -> int:
-    """Threads a grain that `write_lists` is to be launched with."""
+    """Return the threads per grain for `write_lists`."""
     return WARP if build.cooperative else 1
 
 
 @functools.cache
 def neighbour_kernels(build: Build) -> SimpleNamespace:
-    """The end of a rebuild, after the search: `write_lists` and `finish`."""
+    """Return the kernels after the search: `write_lists` and `finish`."""
     precision = build.precision
     real, vec4 = precision.real, precision.vec4
     types = device_structs(precision)
@@ -52,7 +52,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def place_of(array: wp.array(dtype=int), first: int, count: int, value: int, guess: int) -> int:
-        """Index of the first of `count` sorted numbers that is not less than a value; walks from a guess."""
+        """Return the index of the first of `count` sorted numbers not below a value, from a guess."""
         place = wp.min(guess, count)
         while place > 0 and array[first + place - 1] >= value:
             place -= 1
@@ -62,7 +62,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def rank_of(array: wp.array(dtype=int), first: int, count: int, value: int) -> int:
-        """Count of those among `count` numbers that are less than a value."""
+        """Return how many of `count` numbers are below a value."""
         rank = int(0)
         for k in range(count):
             rank += wp.where(array[first + k] < value, 1, 0)
@@ -70,7 +70,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def sort(array: wp.array(dtype=int), first: int, count: int):
-        """Sorts some numbers, which are few, in place."""
+        """Sort a few numbers in place."""
         for k in range(1, count):
             value = array[first + k]
             place = int(k)
@@ -83,7 +83,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     def stays(
         model: Model, world: World, grains: Grains, neighbours: Neighbours, w: int, g: int, entry: int
     ) -> bool:
-        """Tell that neither partner of an entry was searched, and that they are near: a grain or a wall."""
+        """Return True if an entry of the old list stays: its partner did not move and is near."""
         partner = entry & mask
         if partner >= model.grain_count * spheres_each:
             return True
@@ -93,7 +93,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def draft(neighbours: Neighbours, cells: Cells, place: int, entry: int, old: int):
-        """Writes an entry of a list to come, with the history of an old slot where there is one."""
+        """Write an entry of a draft, with the history of an old slot if there is one."""
         history = vec4(real(0.0), real(0.0), real(0.0), real(-1.0))
         if old >= 0:
             history = pack.load_vec4(neighbours.history, old)
@@ -104,7 +104,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def settle(neighbours: Neighbours, cells: Cells, slot: int, place: int):
-        """Puts an entry that was drafted into its list."""
+        """Copy an entry of a draft into its list."""
         neighbours.entry[slot] = cells.drafts[place]
         pack.store_vec4(neighbours.history, slot, pack.load_vec4(cells.draft_history, place))
         for m in range(memory_each):
@@ -115,31 +115,31 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         world: World, neighbours: Neighbours, flags: wp.array(dtype=int), w: int, g: int, length: int,
         moves: bool,
     ):  # fmt: skip
-        """Notes the length of a new list."""
-        if length > world.most_listed:
+        """Set the length of a new list."""
+        if length > world.list_limit:
             wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
-        neighbours.count[g] = wp.min(length, world.most_listed)
+        neighbours.count[g] = wp.min(length, world.list_limit)
         if moves:
             neighbours.travel[g] = real(0.0)
 
     @wp.func
     def found_of(world: World, cells: Cells, flags: wp.array(dtype=int), w: int, i: int) -> int:
-        """Count of the partners that were found of a sphere, whose bucket is empty for the next time."""
+        """Return the number of partners found of a sphere, and clear its bucket."""
         # every sphere of the bucket writes the same
         cells.bucket_size[cells.bucket[i]] = 0
-        if cells.found_count[i] > world.most_found:
+        if cells.found_count[i] > world.found_limit:
             wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
-        return wp.min(cells.found_count[i], world.most_found)
+        return wp.min(cells.found_count[i], world.found_limit)
 
     @wp.kernel(module=module)
     def merge_lists(
         model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
         flags: wp.array(dtype=int),
     ):  # fmt: skip
-        """A grain's new list by one thread: what was found, and of the old list what stays.
+        """Merge the found partners with the entries that stay into a grain's new list, in one thread.
 
-        The list of a grain that has not moved, and is a new partner of none that has, stays as it is. It may
-        have partners that have moved away, which do no harm: they go with the next change.
+        The list of a grain that did not move, and has no new partner, stays. It may have partners that moved
+        away, without harm; the next change removes them.
         """
         g = wp.tid()
         w = g // model.grain_count
@@ -158,7 +158,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         place = int(0)
         for s in range(model.shape_sphere_count[model.shape[g]]):
             i = g * spheres_each + s
-            own = wp.min(cells.found_count[i], world.most_found)
+            own = wp.min(cells.found_count[i], world.found_limit)
             found = i * cells.found_capacity
             sort(cells.found, found, own)
             end = found + own
@@ -175,7 +175,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
                 entry = wp.min(listed, fresh)
                 if entry != NO_ENTRY:
                     if entry == fresh or (not moves and stays(model, world, grains, neighbours, w, g, entry)):
-                        if place < world.most_listed:
+                        if place < world.list_limit:
                             draft(neighbours, cells, place, entry, wp.where(entry == listed, old, -1))
                         place += 1
                     old += wp.where(entry == listed, 1, 0)
@@ -186,20 +186,20 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def count_found(world: World, cells: Cells, g: int, entry: int) -> int:
-        """Count of the partners found of a grain's spheres whose entries are less than one."""
+        """Return the number of found partners of a grain whose entries are below a given one."""
         s = entry >> bits
         less = int(0)
         for i in range(g * spheres_each, g * spheres_each + s):
-            less += wp.min(cells.found_count[i], world.most_found)
+            less += wp.min(cells.found_count[i], world.found_limit)
         i = g * spheres_each + s
-        own = wp.min(cells.found_count[i], world.most_found)
+        own = wp.min(cells.found_count[i], world.found_limit)
         return less + rank_of(cells.found, i * cells.found_capacity, own, entry & mask)
 
     @wp.func
     def count_kept(
         model: Model, world: World, grains: Grains, neighbours: Neighbours, w: int, g: int, end: int
     ) -> int:
-        """Count of the entries that stay before a slot of a grain's old list."""
+        """Return the number of entries that stay before a slot of a grain's old list."""
         kept = int(0)
         for k in range(g * neighbours.capacity, end):
             kept += wp.where(stays(model, world, grains, neighbours, w, g, neighbours.entry[k]), 1, 0)
@@ -210,7 +210,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
         flags: wp.array(dtype=int),
     ):  # fmt: skip
-        """The same lists by a warp a grain: an entry's place is found by counting, as they are few."""
+        """Write the same lists with a warp per grain: an entry's place is found by counting."""
         thread = wp.tid()
         g = thread // WARP
         lane = thread - g * WARP
@@ -239,14 +239,14 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
                 place = kept + bit_count(kept_lanes & ((1 << lane) - 1))
                 if is_kept:
                     place += count_found(world, cells, g, entry)
-                    if place < world.most_listed:
+                    if place < world.list_limit:
                         draft(neighbours, cells, first + place, entry, first + k)
                 kept += bit_count(kept_lanes)
         for k in range(lane, found, WARP):
             i = g * spheres_each
             rest = int(k)
-            while rest >= wp.min(cells.found_count[i], world.most_found):
-                rest -= wp.min(cells.found_count[i], world.most_found)
+            while rest >= wp.min(cells.found_count[i], world.found_limit):
+                rest -= wp.min(cells.found_count[i], world.found_limit)
                 i += 1
             entry = ((i - g * spheres_each) << bits) | cells.found[i * cells.found_capacity + rest]
             place = count_found(world, cells, g, entry)
@@ -257,11 +257,11 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
             if old < old_count:
                 if neighbours.entry[first + old] == entry:
                     slot = first + old
-            if place < world.most_listed:
+            if place < world.list_limit:
                 draft(neighbours, cells, first + place, entry, slot)
         sync_warp()
         length = kept + found
-        for k in range(lane, wp.min(length, world.most_listed), WARP):
+        for k in range(lane, wp.min(length, world.list_limit), WARP):
             settle(neighbours, cells, first + k, first + k)
         if lane == 0:
             end_list(world, neighbours, flags, w, g, length, moves)

@@ -1,8 +1,7 @@
 """Packing of a sphere's position, and of a contact's step number, into four components.
 
-In the `mixed` precision a sphere is four 32-bit integers, three counts of the world's length unit and the
-bits of its float32 radius, so that the difference of two positions is exact wherever the heap stands. In
-`double` it is four floats.
+In `mixed` precision a sphere is four 32-bit integers: three counts of the world's length unit and the bits of
+its float32 radius, so that the difference of two positions is exact. In `double` it is four floats.
 """
 
 import functools
@@ -30,7 +29,7 @@ STORE_16 = """
 
 
 def _memory_access(vector, kind: str, real: str) -> tuple:
-    """Load and store of a four-vector: 16 bytes at once on the GPU, where Warp's types carry no alignment."""
+    """Return load and store of a four-vector; Warp's types lack the alignment for 16 bytes at once."""
     load_code, store_code = "return a.data[i];", "a.data[i] = v;"
     if kind:
         load_code, store_code = LOAD_16.format(kind=kind, real=real), STORE_16.format(kind=kind)
@@ -142,7 +141,7 @@ def _float_spheres(precision: Precision) -> SimpleNamespace:
 
 @functools.cache
 def packing(precision: Precision) -> SimpleNamespace:
-    """Functions on packed spheres and histories in one precision.
+    """Return functions on packed spheres and histories in one precision.
 
     `pack(position, last, world)`, `pack_offset(center, offset, last, world)`, `difference(a, b, world)` [m],
     `last(a)` (the radius of a sphere, the size factor of a centre), `place(a, world)` [m], `stamp`,

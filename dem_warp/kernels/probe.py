@@ -1,4 +1,4 @@
-"""Contacts of a world as they are between two steps: what each bears, and where it is."""
+"""Forces and places of a world's contacts between two steps."""
 
 import functools
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from dem_warp.types import Build, device_structs
 
 @functools.cache
 def probe_kernels(build: Build) -> SimpleNamespace:
-    """`bear` of one build."""
+    """Return `measure` of one build."""
     precision = build.precision
     real, vec3 = precision.real, precision.vec3
     types = device_structs(precision)
@@ -33,7 +33,7 @@ def probe_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def meeting_point(model: Model, world: World, grains: Grains, w: int, g: int, entry: int, step: int):
-        """Point [m] and unit normal, from the partner to the grain, of an entry whose two meet."""
+        """Return point [m] and unit normal, from the partner to the grain, of an entry with a contact."""
         partner = entry & mask
         wall_base = model.grain_count * spheres_each
         a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> bits))
@@ -55,7 +55,7 @@ def probe_kernels(build: Build) -> SimpleNamespace:
         return place + wp.vec3d(wp.float64(lever[0]), wp.float64(lever[1]), wp.float64(lever[2])), normal
 
     @wp.kernel(module=module)
-    def bear(
+    def measure(
         w: int,
         # model
         model: Model,
@@ -69,7 +69,7 @@ def probe_kernels(build: Build) -> SimpleNamespace:
         points: wp.array(dtype=wp.vec3d),
         normals: wp.array(dtype=vec3),
     ):
-        """Finds what the contacts of a world bear, as the next step would; histories move on as in a step."""
+        """Compute the contact forces of a world as in the next step, which advances the histories too."""
         place = wp.tid()
         g = w * model.grain_count + place
         if alive[g] <= 0:
@@ -92,4 +92,4 @@ def probe_kernels(build: Build) -> SimpleNamespace:
                     points[out] = point
                     normals[out] = normal
 
-    return SimpleNamespace(bear=bear, module=module)
+    return SimpleNamespace(measure=measure, module=module)

@@ -5,18 +5,18 @@ import warp as wp
 from dem_warp.kernels.lanes import lanes_with, sync_warp
 
 CLEARANCE = 1.02
-"""Spheres are kept apart by this factor of the sum of their radii."""
+"""Least distance of spheres over the sum of their radii."""
 
 TRIALS = 64
-"""Places tried at one height; then the grain comes a little later."""
+"""Places tried at one height; then the grain is delayed."""
 
 MAX_DELAYS = 4000
-"""Heights passed over in a whole rain before it is given up."""
+"""Most delays in a rain; then it fails."""
 
 
 @wp.func
 def place_in(section: wp.vec3, u: float, v: float) -> wp.vec2:
-    """Point of a cross-section, evenly distributed when `u` and `v` are in 0 to 1."""
+    """Return a point of a cross-section, uniform for uniform `u` and `v` in 0 to 1."""
     if section[2] > 0.0:
         angle = 2.0 * wp.pi * u
         across = section[2] * wp.sqrt(v)
@@ -26,7 +26,7 @@ def place_in(section: wp.vec3, u: float, v: float) -> wp.vec2:
 
 @wp.func
 def is_outside(section: wp.vec3, x: float, y: float, radius: float) -> bool:
-    """Tell whether a sphere passes the edge of a cross-section."""
+    """Return True if a sphere passes the edge of a cross-section."""
     if section[2] > 0.0:
         return wp.sqrt(x * x + y * y) + radius > section[2]
     return wp.abs(x) + radius > section[0] or wp.abs(y) + radius > section[1]
@@ -47,7 +47,7 @@ def spread_spheres(
     section: wp.vec3,
     spheres: wp.array(dtype=wp.vec4),
 ) -> bool:
-    """Places a grain's spheres, a sphere a lane; whether one of the lane's passes the edge."""
+    """Place a grain's spheres, a sphere per lane; return True if one of the lane's passes the edge."""
     outside = bool(False)
     for s in range(lane, count, lanes):
         local = shape_spheres[first + s] * size
@@ -62,7 +62,7 @@ def spread_spheres(
 def meet(
     g: int, count: int, h: int, others: int, sphere_count: int, spheres: wp.array(dtype=wp.vec4)
 ) -> bool:
-    """Tell whether two grains are less than the clearance apart."""
+    """Return True if two grains are nearer than the clearance."""
     for a in range(count):
         for b in range(others):
             sa = spheres[g * sphere_count + a]
@@ -93,9 +93,9 @@ def place_grains(
     spheres: wp.array(dtype=wp.vec4),
     delays: wp.array(dtype=int),
 ):
-    """Places the grains of a world, which begin at `first`, in order of arrival; a warp a world on a GPU.
+    """Place the grains of a world, which begin at `first`, in order of arrival; a warp per world on a GPU.
 
-    A cross-section is its half sides along x and y, and its radius where it is round, 0 where it is not [m].
+    A cross-section has its half sides along x and y, and its radius if it is round, otherwise 0 [m].
     """
     thread = wp.tid()
     w = thread // lanes
@@ -119,7 +119,7 @@ def place_grains(
                     )  # fmt: skip
                     placed = lanes_with(outside) == 0
                     sync_warp()
-                    # an earlier grain a lane, from the last one down to those too low to be met
+                    # an earlier grain per lane, from the last one down to those too low to touch
                     last = g - 1
                     while placed and last >= first[w] and z - position[last][2] < 2.0 * reach[w]:
                         h = last - lane

@@ -14,7 +14,7 @@ from dem_warp.types import Build, device_structs
 
 @functools.cache
 def step_kernels(build: Build) -> SimpleNamespace:
-    """`step`, `remove` and `place_spheres` of one build."""
+    """Return `step`, `remove` and `place_spheres` of one build."""
     precision = build.precision
     types = device_structs(precision)
     Model, Grains, Neighbours = types.Model, types.Grains, types.Neighbours
@@ -29,7 +29,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
         {"fast_math": build.cooperative and precision.is_fixed_point, "enable_backward": False}, module
     )
 
-    # five blocks find room on a multiprocessor instead of four; laws beyond the base need the registers
+    # five blocks per multiprocessor instead of four; laws beyond the base need the registers
     is_base = precision.is_fixed_point and build.has_base_law and not build.has_mesh
     limits = {"cuda_max_registers": 96} if is_base else {}
 
@@ -48,7 +48,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
         # state out
         grains_out: Grains,
     ):
-        """Moves `slot_count` grain slots of `running` worlds on by a step; `lanes` threads a grain."""
+        """Step `slot_count` grain slots of `running` worlds, with `lanes` threads per grain."""
         thread = wp.tid()
         slot = thread // lanes
         lane = thread - slot * lanes
@@ -106,9 +106,9 @@ def step_kernels(build: Build) -> SimpleNamespace:
         # state out
         grains_out: Grains,
     ):
-        """The same by a single thread, as each of many would read the arguments anew.
+        """Step `slot_count` grain slots of `running` worlds in a single thread.
 
-        It takes the grains of a world in their order, which the sums of their contacts rest on.
+        The order of the grains determines the sums of their contacts.
         """
         for r in range(slot_count // model.grain_count):
             w = int(r)
@@ -125,7 +125,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def remove(model: Model, removed: wp.array(dtype=int), alive: wp.array(dtype=int), a: Grains, b: Grains):
-        """Takes the grains listed in `removed` out of both copies of the state."""
+        """Remove the grains listed in `removed` from both copies of the state."""
         g = removed[wp.tid()]
         alive[g] = 0
         motion.clear_spheres(model, a, g)
@@ -133,7 +133,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def place_spheres(model: Model, grains: Grains):
-        """Centres and spheres from the poses; the size factor is in the last component of the centre."""
+        """Set centres and spheres from the poses; the last component of a centre is the size factor."""
         g = wp.tid()
         world = model.world[g // model.grain_count]
         center = pack.pack(grains.position[g], pack.last(grains.center[g]), world)

@@ -1,11 +1,11 @@
-"""Sum of the contacts of a grain, in the order of its neighbour list: on one thread, or by a warp of a GPU.
+"""Sum of the contacts of a grain, in the order of its neighbour list.
 
-A single thread takes the grains in their order. It walks through what is near a grain and comes after it, and
-sets the opposite force on each partner; so the sum begins with what earlier grains have set, in their order.
+On a CPU a single thread takes the grains in order. It computes the candidates of a grain and adds the
+opposite force to each partner; so the sum begins with the reactions of earlier grains, in their order.
 
-The lanes of a GPU warp share out what is near all of its grains, 32 items at once; then the grains' lanes add
+The lanes of a GPU warp share the candidates of all its grains, 32 items at once; then the grains' lanes add
 up, component by component, in the order of the list. Any number of lanes adds the same floats in the same
-order; what does not touch adds zero.
+order; items without contact add zero.
 """
 
 import functools
@@ -21,14 +21,14 @@ from dem_warp.types import Build, device_structs
 MIN_LANES = 2
 COMPONENTS = 7  # force, torque, rolling torque
 ADDERS = 8
-"""Lanes that add up one grain's components; a power of two."""
+"""Lanes that sum one grain's components; a power of two."""
 
 SUMS = COMPONENTS * WARP // MIN_LANES
 
 
 @functools.cache
 def serial_sum(build: Build):
-    """Function that adds a grain's contacts to what it has got, called for the grains of a world in order."""
+    """Return a function that adds a grain's contacts to its reactions, for the grains of a world in order."""
     real, vec3, vec4 = build.precision.real, build.precision.vec3, build.precision.vec4
     types = device_structs(build.precision)
     Model, Grains, Neighbours = types.Model, types.Grains, types.Neighbours
@@ -37,7 +37,7 @@ def serial_sum(build: Build):
 
     @wp.func
     def add_contacts(model: Model, grains: Grains, neighbours: Neighbours, w: int, g: int, step: int):
-        """A grain that waits to be released feels nothing, but it may be in the way of another."""
+        """Add the contacts of a grain; one that waits for its release has forces only on its partners."""
         f4 = pack.load_vec4(neighbours.reactions.force, g)
         t4 = pack.load_vec4(neighbours.reactions.torque, g)
         force = vec3(f4[0], f4[1], f4[2])
@@ -60,7 +60,7 @@ def serial_sum(build: Build):
 
 @functools.cache
 def _totals(build: Build) -> SimpleNamespace:
-    """Results of 32 contacts and sums of the grains, in the shared memory of a warp."""
+    """Return functions on the results of 32 contacts and the grains' sums in a warp's shared memory."""
     real, vec3 = build.precision.real, build.precision.vec3
     kind = "float" if build.precision.is_fixed_point else "double"
 
@@ -84,7 +84,7 @@ def _totals(build: Build) -> SimpleNamespace:
 
     @wp.func
     def add(group: int, i: int, begin: int, end: int):
-        """Adds component `i` of the results from `begin` to `end` to the group's sum, in order."""
+        """Add component `i` of the results from `begin` to `end` to the group's sum, in order."""
         value = total(group * COMPONENTS + i, real(0.0), False)
         for k in range(begin, end):
             value += result(i * (WARP + 1) + k, real(0.0), False)
@@ -99,7 +99,7 @@ def _totals(build: Build) -> SimpleNamespace:
 
 @functools.cache
 def cooperative_sum(build: Build):
-    """Function that sums the contacts of a warp's grains; every lane of the warp must call it."""
+    """Return a function that sums the contacts of a warp's grains; every lane of the warp must call it."""
     vec3 = build.precision.vec3
     types = device_structs(build.precision)
     Model, Grains, Neighbours = types.Model, types.Grains, types.Neighbours
@@ -108,7 +108,7 @@ def cooperative_sum(build: Build):
 
     @wp.func
     def group_of(item: int, start: int, lanes: int) -> int:
-        """Group of lanes whose items, which begin at `start`, hold an item: the last to begin by then."""
+        """Return the group of lanes of an item: the last group with `start` at or before it."""
         group = int(0)
         half = WARP // lanes // 2
         while half > 0:
@@ -119,10 +119,7 @@ def cooperative_sum(build: Build):
 
     @wp.func
     def add_up(thread: int, lanes: int, start: int, count: int, batch: int, group: int, last: int):
-        """Adds the results of a batch to the sums of its groups, from `group` to the `last`.
-
-        Several groups at a time, a component a lane.
-        """
+        """Add the results of a batch to the sums of its groups, several groups at once."""
         i = thread % ADDERS
         for n in range((last - group) // (WARP // ADDERS) + 1):
             own = group + n * (WARP // ADDERS) + thread // ADDERS
@@ -136,7 +133,7 @@ def cooperative_sum(build: Build):
         model: Model, grains: Grains, neighbours: Neighbours, w: int, g: int, count: int, first: int,
         step: int, thread: int, lane: int, lanes: int,
     ):  # fmt: skip
-        """`count` is 0 for a lane whose grain takes no part; `thread` is the lane's number in the warp."""
+        """Sum the contacts; `count` is 0 for an inactive grain, `thread` is the lane's number in the warp."""
         group = thread // lanes
         totals.clear(group, lane, lanes)
         through = running_sum(wp.where(lane == 0, count, 0))

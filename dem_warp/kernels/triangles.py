@@ -1,10 +1,8 @@
-"""Contacts of a sphere with a mesh of triangles: one wherever the surface comes nearest to its centre.
+"""Contacts of a sphere with a mesh of triangles: one at each nearest point of the surface.
 
-Each triangle is a partner of its own, so a sphere in a corner touches several. Where its nearest point lies
-on an edge or in a corner, other triangles have that point too. The contact then belongs to the one of them
-that comes nearest, and of equally near ones to the first. So of a sphere over a flat or concave edge, the
-triangle under it has the contact; over a convex edge or corner, one of those that share it; and no contact is
-lost or counted twice, because all of them work out the same distances, bit for bit.
+Each triangle is a partner, so a sphere in a corner touches several. If the nearest point is on an edge or in
+a corner, the contact belongs to the nearest of the triangles that share it, and to the first of equally near
+ones. No contact is lost or counted twice, because all triangles compute the same distances, bit for bit.
 """
 
 import functools
@@ -15,18 +13,18 @@ import warp as wp
 from dem_warp.types import Precision, device_structs
 
 CORNERS = 0b111
-CLOSE = 1.0e-5  # of a sphere's radius; this near to an edge or corner, a point lies on it
+CLOSE = 1.0e-5  # largest distance of a point on an edge or corner, over the sphere's radius
 
 
 @functools.cache
 def triangle_functions(precision: Precision) -> SimpleNamespace:
-    """`from_triangle`, `touches` and `joined`; positions are in the frame of the mesh, all in float64."""
+    """Return `from_triangle`, `touches` and `joined`; positions are in the frame of the mesh, in float64."""
     types = device_structs(precision)
     Model, Triangle = types.Model, types.Triangle
 
     @wp.func
     def from_segment(a: wp.vec3d, b: wp.vec3d, q: wp.vec3d) -> wp.vec3d:
-        """Vector to `q` from the nearest point of a segment, exact at its ends."""
+        """Return the vector to `q` from the nearest point of a segment, exact at its ends."""
         side = b - a
         part = wp.dot(q - a, side) / wp.dot(side, side)
         if part >= wp.float64(1.0):
@@ -39,14 +37,14 @@ def triangle_functions(precision: Precision) -> SimpleNamespace:
 
     @wp.func
     def from_triangle(t: Triangle, q: wp.vec3d) -> wp.vec3d:
-        """Vector to `q` from the nearest point of a triangle."""
+        """Return the vector to `q` from the nearest point of a triangle."""
         ab = t.b - t.a
         ac = t.c - t.a
         r = q - t.a
-        beside_ac = wp.dot(wp.cross(r, ac), t.normal)
-        beside_ab = wp.dot(wp.cross(ab, r), t.normal)
-        inside = beside_ac >= wp.float64(0.0) and beside_ab >= wp.float64(0.0)
-        if inside and beside_ac + beside_ab <= wp.dot(wp.cross(ab, ac), t.normal):
+        side_ac = wp.dot(wp.cross(r, ac), t.normal)
+        side_ab = wp.dot(wp.cross(ab, r), t.normal)
+        inside = side_ac >= wp.float64(0.0) and side_ab >= wp.float64(0.0)
+        if inside and side_ac + side_ab <= wp.dot(wp.cross(ab, ac), t.normal):
             return t.normal * wp.dot(r, t.normal)
         d = shorter(from_segment(t.a, t.b, q), from_segment(t.a, t.c, q))
         return shorter(d, from_segment(t.b, t.c, q))
@@ -57,7 +55,7 @@ def triangle_functions(precision: Precision) -> SimpleNamespace:
 
     @wp.func
     def corners_around(t: Triangle, p: wp.vec3d, near: wp.float64) -> int:
-        """Bits of the corners that span what a point lies on: a corner, an edge or the face."""
+        """Return the bits of the corners of the feature with a point: a corner, an edge or the face."""
         if wp.length(p - t.a) < near:
             return 1
         if wp.length(p - t.b) < near:
@@ -74,31 +72,31 @@ def triangle_functions(precision: Precision) -> SimpleNamespace:
 
     @wp.func
     def touches(model: Model, first: int, index: int, q: wp.vec3d, radius: wp.float64) -> bool:
-        """Tell whether a sphere has a contact with triangle `index` of a mesh that begins at `first`."""
+        """Return True if a sphere has a contact with triangle `index` of a mesh that begins at `first`."""
         t = model.triangle[first + index]
         d = from_triangle(t, q)
         distance2 = wp.dot(d, d)
-        if not (distance2 < radius * radius):  # a radius that is not a number touches nothing
+        if not (distance2 < radius * radius):  # with NaN as radius there is no contact
             return False
         corners = corners_around(t, q - d, wp.float64(CLOSE) * radius)
         if corners == CORNERS:
             return True
         for k in range(t.first, t.first + t.count):
-            other = model.beside[k]
+            other = model.adjacent[k]
             if corners & other == corners:
-                rival = other >> 3
-                e = from_triangle(model.triangle[first + rival], q)
-                if wp.dot(e, e) < distance2 or (wp.dot(e, e) == distance2 and rival < index):
+                neighbour = other >> 3
+                e = from_triangle(model.triangle[first + neighbour], q)
+                if wp.dot(e, e) < distance2 or (wp.dot(e, e) == distance2 and neighbour < index):
                     return False
         return True
 
     @wp.func
     def joined(model: Model, index: int, other: int) -> bool:
-        """Tell whether triangle `index` of the table shares a corner with number `other` of its mesh."""
+        """Return True if triangle `index` of the table shares a corner with number `other` of its mesh."""
         t = model.triangle[index]
         found = bool(False)
         for k in range(t.first, t.first + t.count):
-            found = found or model.beside[k] >> 3 == other
+            found = found or model.adjacent[k] >> 3 == other
         return found
 
     return SimpleNamespace(from_triangle=from_triangle, touches=touches, joined=joined)

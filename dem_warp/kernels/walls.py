@@ -1,4 +1,4 @@
-"""Places of the walls, step by step, and a sphere's contact with one: overlap, normal, wall velocity."""
+"""Places of the walls in each step, and a sphere's contact with one: overlap, normal, wall velocity."""
 
 import functools
 from types import SimpleNamespace
@@ -9,16 +9,16 @@ from dem_warp.kernels.triangles import triangle_functions
 from dem_warp.types import FRAMES, Build, device_structs
 from dem_warp.walls import CYLINDER, MESH, PLANE
 
-TINY = 1.0e-12  # m; nearer than this to an axis or a surface no direction is defined
+TINY = 1.0e-12  # [m] least distance from an axis or a surface for a direction
 TURN = wp.constant(wp.float64(2.0 * wp.pi))  # rad
 
 
 @functools.cache
 def wall_functions(build: Build) -> SimpleNamespace:
-    """`wall_of`, `frame_of`, `touches`, `nears`, `meet` and `path` of one build.
+    """Return `wall_of`, `frame_of`, `touches`, `nears`, `meet` and `path` of one build.
 
-    Among the partners of a sphere, walls have numbers from 0 and the triangles of their meshes those after.
-    Geometry is in float64: an overlap is 1e-3 to 1e-6 of the distances that it is the difference of.
+    The walls have numbers from 0, the triangles of their meshes the numbers after. Geometry is in float64, as
+    an overlap is 1e-3 to 1e-6 of the distances.
     """
     real, vec3 = build.precision.real, build.precision.vec3
     types = device_structs(build.precision)
@@ -34,7 +34,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def root(x: wp.float64) -> wp.float64:
-        """Square root; in the mixed precision a float32 root and a step of Newton's, good to 1e-14."""
+        """Return the square root; in mixed precision a float32 root and a Newton step, exact to 1e-14."""
         if wp.static(build.precision.is_fixed_point):
             guess = wp.max(wp.sqrt(float(x)), float(TINY))
             rest = x - wp.float64(guess) * wp.float64(guess)
@@ -43,14 +43,14 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def frame_of(model: Model, wall: int, step: int) -> Frame:
-        """Place of a wall in a step, one of those that `place_walls` was last asked for."""
+        """Return the frame of a wall in a step, from the last `place_walls`."""
         return model.frame[wall * FRAMES + step % FRAMES]
 
     @wp.func
     def from_profile(wall: Wall, axis: wp.vec3d, r: wp.vec3d):
-        """Vector to `r` from the nearest point of the surface that the wall's profile sweeps, and its length.
+        """Return the vector to `r` from the nearest point of the surface swept by a profile, and its length.
 
-        On the axis every point of a ring is as near: the vector is what they have in common, along the axis.
+        On the axis all points of a ring are equally near: the vector is then along the axis.
         """
         along = wp.dot(r, axis)
         across = r - axis * along
@@ -67,7 +67,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def overlaps(wall: Wall, frame: Frame, position: wp.vec3d, radius: real) -> bool:
-        """Tell whether a sphere touches the wall; away from a cylinder's rims without a root."""
+        """Return True if a sphere touches the wall; away from a cylinder's rims without a root."""
         r = position - frame.origin
         reach = wp.float64(radius)
         along = wp.dot(r, frame.axis)
@@ -83,7 +83,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def wall_of(model: Model, w: int, number: int) -> int:
-        """The wall that a partner is or, if it is a triangle, belongs to."""
+        """Return the wall of a partner, a wall or a triangle."""
         wall = w * walls_each + number
         if wp.static(has_mesh):
             if number >= walls_each:
@@ -95,18 +95,18 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def joined(model: Model, w: int, number: int, other: int) -> bool:
-        """Tell whether a triangle shares a corner with another partner."""
+        """Return True if a triangle shares a corner with another partner."""
         facets = model.facets[wall_of(model, w, number)]
         return triangles.joined(model, facets.first + number - facets.number, other - facets.number)
 
     @wp.func
     def to_mesh(frame: Frame, position: wp.vec3d) -> wp.vec3d:
-        """Position in a mesh's own frame."""
+        """Return a position in a mesh's own frame."""
         return wp.quat_rotate_inv(frame.rotation, position - frame.origin)
 
     @wp.func
     def touches(model: Model, w: int, number: int, position: wp.vec3d, radius: real, step: int) -> bool:
-        """Tell whether a sphere touches a wall or a triangle."""
+        """Return True if a sphere touches a wall or a triangle."""
         wall = wall_of(model, w, number)
         frame = frame_of(model, wall, step)
         if wp.static(has_mesh):
@@ -120,7 +120,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def nears(model: Model, w: int, number: int, position: wp.vec3d, reach: real, step: int) -> bool:
-        """Tell whether a wall or a triangle has a point nearer to a position than `reach` [m]."""
+        """Return True if a wall or a triangle has a point within `reach` [m] of a position."""
         if wp.static(has_mesh):
             if number >= walls_each:
                 wall = wall_of(model, w, number)
@@ -161,7 +161,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
     def meet(
         model: Model, contact: Contact, wall: int, number: int, position: wp.vec3d, radius: real, step: int
     ) -> Contact:
-        """Geometry of a contact with a wall, or with a triangle of it; the wall's motion is taken off."""
+        """Set the geometry of a contact with a wall or a triangle of it, and the opposite of its motion."""
         frame = frame_of(model, wall, step)
         r = position - frame.origin
         overlap, normal = overlap_and_normal(model.wall[wall], frame.axis, r, radius)
@@ -179,9 +179,9 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def path(wall: Wall, frame: Frame, world: World, time: wp.float64) -> wp.float64:
-        """Farthest that the wall's motion takes any point of it that grains may touch, in a time [m].
+        """Return the longest path in a time of any point of the wall that grains may touch [m].
 
-        A spin about its own axis leaves a surface of revolution where it is.
+        A spin about its own axis does not move a surface of revolution.
         """
         sway = wall.spin
         if wall.kind != MESH:
@@ -205,7 +205,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
 @functools.cache
 def wall_kernels(build: Build) -> SimpleNamespace:
-    """`place_walls` works out where walls stand in the steps to come."""
+    """Return `place_walls`, which computes the frames of the walls in the next steps."""
     precision = build.precision
     real, vec3 = precision.real, precision.vec3
     types = device_structs(precision)
@@ -216,7 +216,7 @@ def wall_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def moved(wall: Wall, time: wp.float64) -> Frame:
-        """Frame of a wall at a time [s] since its motion started."""
+        """Return the frame of a wall at a time [s] since the start of its motion."""
         past = wp.min(time, wall.duration)
         rate = wp.length(wall.spin)
         turn = wp.quat_from_axis_angle(wp.normalize(wall.spin), rate * past)
@@ -233,7 +233,7 @@ def wall_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def place_walls(ahead: int, model: Model, grains: Grains):
-        """Frames of every wall for the present step and the `ahead` next: a closed form, nothing adds up."""
+        """Set the frames of every wall in the present step and the `ahead` next, in closed form."""
         i = wp.tid()
         index = i // (ahead + 1)
         w = index // walls_each

@@ -1,4 +1,4 @@
-"""A bond of two surfaces: it forms where they touch, and lasts until they stand too far apart."""
+"""Bond of two surfaces: it forms where they touch and breaks beyond a distance."""
 
 from typing import Any
 
@@ -7,9 +7,9 @@ import warp as wp
 
 @wp.func
 def bonded(contact: Any, longest: Any, memory: Any, at: int) -> bool:
-    """Tell whether two surfaces touched once and were since never more than `longest` [m] apart.
+    """Return True if two surfaces have touched and were never more than `longest` [m] apart since.
 
-    `memory[at]` is 1 while they are bonded and 0 else.
+    `memory[at]` is 1 while they are bonded and 0 otherwise.
     """
     bond = memory[at]
     if contact.is_new or contact.overlap < -longest:

@@ -1,4 +1,4 @@
-"""Capillary bridges: liquid between surfaces that touched pulls them together until it breaks."""
+"""Capillary bridges: liquid between surfaces that have touched attracts them until it breaks."""
 
 import math
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from dem_warp.parameters import Parameter
 
 @wp.func
 def rupture_distance(volume: Any, angle: Any):
-    """Distance of the surfaces (1 + theta / 2) V^(1/3) [m] at which a bridge breaks."""
+    """Return the distance of the surfaces (1 + theta / 2) V^(1/3) [m] at which a bridge breaks."""
     return (type(angle)(1.0) + type(angle)(0.5) * angle) * wp.cbrt(volume)
 
 
 @wp.func
 def bridge_attraction(params: Any, contact: Any, memory: Any, at: int):
-    """Attraction 2 pi R g cos(theta) / (1 + 1.05 S + 2.5 S^2) [N] of a bridge between spheres of radius R."""
+    """Return the attraction 2 pi R g cos(theta) / (1 + 1.05 S + 2.5 S^2) [N] between spheres of radius R."""
     tension = params.surface_tension
     volume = params.bridge_volume
     angle = params.contact_angle
@@ -37,26 +37,21 @@ def bridge_attraction(params: Any, contact: Any, memory: Any, at: int):
 
 @dataclass(frozen=True, kw_only=True)
 class CapillaryBridge(Mechanism):
-    """Touching spheres share a drop of liquid, which pulls them together until it breaks.
-
-    Raises
-    ------
-    ValueError
-        If a value lies outside its range.
+    """Liquid bridge that attracts two spheres from their first touch until it breaks.
 
     Notes
     -----
-    The attraction at the distance D of the surfaces, none of which is counted in an overlap, is ::
+    The attraction at the distance D of the surfaces (0 in an overlap) is ::
 
         F = 2 pi R g cos(theta) / (1 + 1.05 S + 2.5 S^2),    S = D sqrt(R / V)
 
-    with R = 2 R*: the radius of two like spheres; of unlike ones the mean 2 R1 R2 / (R1 + R2) of Derjaguin;
-    on a wall twice that of the sphere. A bridge forms when the surfaces touch and breaks at
+    with R = 2 R*: the radius of two equal spheres, Derjaguin's mean 2 R1 R2 / (R1 + R2) of unequal ones, and
+    twice the radius of a sphere on a wall. A bridge forms when the surfaces touch and breaks at
     D = (1 + theta / 2) V^(1/3).
 
-    The formulas hold for bridges that are small beside the spheres and are not bent by gravity. Every bridge
-    has the same volume, liquid is not handed on, and its viscosity is left out. Each pair of spheres that
-    touched has a bridge of its own, so a grain of several spheres may have several with the same neighbour.
+    The formulas hold for bridges that are small relative to the spheres and not deformed by gravity. All
+    bridges have the same volume; liquid transport and viscosity are neglected. Each pair of spheres has its
+    own bridge, so a grain of several spheres may have several with the same neighbour.
 
     Sources: C. D. Willett, M. J. Adams, S. A. Johnson and J. P. K. Seville, Langmuir 16 (2000) 9396-9405,
     equation 12, which counts half the distance; the rupture: G. Lian, C. Thornton and M. J. Adams, J. Colloid
@@ -64,9 +59,9 @@ class CapillaryBridge(Mechanism):
     """
 
     surface_tension: Annotated[float, Parameter("N/m", at_least=0.0)] = 0.0
-    """Surface tension g; of water 0.072 N/m."""
+    """Surface tension g; water: 0.072 N/m."""
     bridge_volume: Annotated[float, Parameter("m^3", at_least=0.0)] = 0.0
-    """Volume V of each bridge; above 0 where there is surface tension."""
+    """Volume V of each bridge; must be above 0 if the surface tension is."""
     contact_angle: Annotated[float, Parameter("rad", at_least=0.0, below=math.pi / 2)] = 0.0
     """Angle theta of the liquid on the surfaces."""
 
@@ -80,12 +75,12 @@ class CapillaryBridge(Mechanism):
         super().__post_init__()
         if self.surface_tension > 0.0 and self.bridge_volume <= 0.0:
             raise ValueError(
-                "CapillaryBridge.bridge_volume: must be above 0 where there is surface tension [m3], "
+                "CapillaryBridge.bridge_volume: must be above 0 [m^3] if the surface tension is, "
                 f"got {self.bridge_volume!r}"
             )
 
     def reach(self, largest_radius: float, modulus: float) -> float:
-        """Distance [m] at which a bridge breaks."""
+        """Return the distance [m] at which a bridge breaks."""
         if self.surface_tension == 0.0:
             return 0.0
         return (1.0 + 0.5 * self.contact_angle) * self.bridge_volume ** (1.0 / 3.0)

@@ -1,4 +1,4 @@
-"""Rolling resistance that stores: a rotational spring, a slider and a dashpot."""
+"""Elastic-plastic rolling resistance: a rotational spring, a slider and a dashpot."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -13,7 +13,7 @@ from dem_warp.parameters import Parameter
 
 @wp.func
 def spring_torque(params: Any, contact: Any, support: Any, memory: Any, at: int):
-    """Torque [N m] against the roll; remembers how far [rad] the spring is wound up."""
+    """Return the torque [N m] against the roll; remember the angle [rad] of the spring."""
     angle = type(contact.normal)(memory[at], memory[at + 1], memory[at + 2])
     if contact.is_new:
         angle = type(contact.normal)()
@@ -23,7 +23,7 @@ def spring_torque(params: Any, contact: Any, support: Any, memory: Any, at: int)
     normal_stiffness = hertz_stiffness(params.modulus, contact.radius, contact.overlap)
     stiffness = params.rolling_stiffness * normal_stiffness * arm * arm
     inertia = type(contact.overlap)(1.4) / contact.mobility
-    # the product of the two under one root may be too small for float32
+    # two roots, as the product may be too small for float32
     dashpot = type(contact.overlap)(2.0) * params.rolling_damping * wp.sqrt(inertia) * wp.sqrt(stiffness)
     torque, angle = coulomb_spring(angle, stiffness, dashpot, roll, arm * support)
     for i in range(3):
@@ -33,7 +33,7 @@ def spring_torque(params: Any, contact: Any, support: Any, memory: Any, at: int)
 
 @wp.func
 def limit_without_spring(params: Any, limit: Any):
-    """Limit of the constant torque [N m]: none where the spring stands in its place."""
+    """Return the limit of the constant torque [N m]: 0 where the spring replaces it."""
     if params.rolling_stiffness > type(limit)(0.0):
         limit = type(limit)(0.0)
     return limit
@@ -43,27 +43,26 @@ def limit_without_spring(params: Any, limit: Any):
 class ElasticPlasticRolling(Mechanism):
     """Elastic-plastic spring-dashpot rolling resistance, in place of the constant directional torque.
 
-    A grain on a slope below atan(mu_r) stands still in it, and two grains feel opposite torques of one size.
+    A grain on a slope below atan(mu_r) stays at rest, and two grains get opposite torques of equal size.
 
     Notes
     -----
     With the relative roll theta [rad], the part of the relative rotation in the contact's tangent plane since
     the contact was made:
 
-        M = -k_r theta - C_r dtheta/dt  while  |k_r theta| <= mu_r R* F_n, and |M| no more than that;
-        M = -mu_r R* F_n theta / |theta|  beyond, where theta slides back to what the limit holds.
+        M = -k_r theta - C_r dtheta/dt  while  |k_r theta| <= mu_r R* F_n, and |M| at most that;
+        M = -mu_r R* F_n theta / |theta|  beyond, where theta slides back to the limit.
 
     C_r = 2 eta_r sqrt(I_r k_r), with 1 / I_r the sum of 1 / (7/5 m l^2) over the two bodies, l from the
     centre of the grain to the contact: exact for solid spheres.
 
-    Source: Ai, Chen, Rotter and Ooi, Powder Technology 206 (2011) 269-282, model C, without the dashpot
-    beyond the limit (their f = 0). Theirs lets spring and dashpot together pass the limit; here they do not:
-    a fast grain is braked as a slow one.
+    Source: Ai, Chen, Rotter and Ooi, Powder Technology 206 (2011) 269-282, model C with f = 0 (no dashpot
+    beyond the limit), except that here the sum of spring and dashpot does not pass the limit.
     """
 
     rolling_stiffness: Annotated[float, Parameter("1", at_least=0.0)] = 0.0
-    """c in k_r = c S_n (mu_r R*)^2, S_n = 2 E* sqrt(R* d) being the normal stiffness and mu_r the rolling
-    friction of the pair; the source recommends 2.25."""
+    """Factor c in k_r = c S_n (mu_r R*)^2, with the normal stiffness S_n = 2 E* sqrt(R* d) and the rolling
+    friction mu_r of the pair; the source recommends 2.25."""
     rolling_damping: Annotated[float, Parameter("1", at_least=0.0)] = 0.0
     """Damping ratio eta_r of the rolling vibration."""
 

@@ -1,4 +1,4 @@
-"""Plastic dents: a normal spring that gives less back than it took, at any speed."""
+"""Plastic dents: a normal spring that returns only a part of the work, at any speed."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -11,7 +11,7 @@ from dem_warp.parameters import Parameter
 
 @wp.func
 def dented(params: Any, contact: Any, elastic: Any, memory: Any, at: int):
-    """Normal force [N] over a dent; remembers the largest overlap [m]."""
+    """Return the normal force [N] over a dent; remember the largest overlap [m]."""
     zero = type(elastic)(0.0)
     one = type(elastic)(1.0)
     deepest = memory[at]
@@ -35,18 +35,17 @@ class HystereticSpring(Mechanism):
 
         F = K d_max^(3/2) ((d - d_p) / (d_max - d_p))^(3/2),  and 0 below d_p = plasticity d_max,
 
-    down and up again, until d_max is passed. It never attracts. The work given back is 1 - plasticity of that
-    done, so the coefficient of restitution is sqrt(1 - plasticity) at any speed; the base law's damping comes
-    on top, which restitution 1 of the pair leaves out. Unloading starts 1 / (1 - plasticity) times as stiff
-    as Hertz, which the time step must resolve. The dent is forgotten when the contact opens.
+    until d_max is passed. It never attracts. The part 1 - plasticity of the work is returned, so the
+    coefficient of restitution is sqrt(1 - plasticity) at any speed; the base law's damping is added, unless
+    the pair's restitution is 1. Unloading starts 1 / (1 - plasticity) times as stiff as Hertz, which the time
+    step must resolve. The dent is forgotten when the contact opens.
 
-    Source: Walton and Braun, Journal of Rheology 30 (1986) 949-980. Theirs is linear, with stiffnesses
-    K_1 loading and K_2 unloading, e = sqrt(K_1 / K_2); here both branches have Hertz's exponent, so that
-    plasticity 0 is the base law.
+    Source: Walton and Braun, Journal of Rheology 30 (1986) 949-980, with linear branches of stiffness K_1 and
+    K_2, e = sqrt(K_1 / K_2); here both branches have Hertz's exponent, so that plasticity 0 is the base law.
     """
 
     plasticity: Annotated[float, Parameter("1", at_least=0.0, below=1.0)] = 0.0
-    """Depth of the dent that is left over the largest overlap, d_p / d_max."""
+    """Depth of the remaining dent over the largest overlap, d_p / d_max."""
 
     name: ClassVar[str] = "hysteretic_spring"
     strength: ClassVar[str] = "plasticity"

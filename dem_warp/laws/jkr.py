@@ -11,24 +11,24 @@ from dem_warp.laws.mechanism import Mechanism
 from dem_warp.parameters import Parameter
 
 PULL_OFF = 0.75 * 4.0 ** (-1.0 / 3.0)
-"""Largest distance of two surfaces in contact, over s^2 / R*: that of p = 4^(-2/3)."""
+"""Largest distance of two surfaces in contact, over s^2 / R*, at p = 4^(-2/3)."""
 
 DEEPEST = 1.0e8
-"""Overlap over s^2 / R* beyond which the attraction is pi W R*, to 1e-6; further cubes pass float32."""
+"""Overlap over s^2 / R* beyond which the attraction is pi W R* to 1e-6; cubes of more exceed float32."""
 
 
 @wp.func
 def adhesive_span(work: Any, radius: Any, modulus: Any):
-    """The length s = (2 pi W R*^2 / E*)^(1/3) [m] by which contact radii are measured."""
+    """Return the unit of length s = (2 pi W R*^2 / E*)^(1/3) [m] of contact radii."""
     return wp.cbrt(type(work)(2.0) * type(work)(math.pi) * work * radius * radius / modulus)
 
 
 @wp.func
 def relative_contact_radius(depth: Any):
-    """The larger p with p^2 - sqrt(p) = `depth`, for a depth of -PULL_OFF or more: the stable contact.
+    """Return the larger p with p^2 - sqrt(p) = `depth`, for depth >= -PULL_OFF: the stable contact.
 
-    With x = sqrt(p), x^4 - x - depth is the product of x^2 + u x + v and x^2 - u x + w, where u^2 is the one
-    positive root of y^3 + 4 depth y = 1, here from Cardano's formula, free of cancellation.
+    With x = sqrt(p), x^4 - x - depth is the product of x^2 + u x + v and x^2 - u x + w, where u^2 is the only
+    positive root of y^3 + 4 depth y = 1, from Cardano's formula without cancellation.
     """
     half = type(depth)(0.5)
     zero = type(depth)(0.0)
@@ -44,7 +44,7 @@ def relative_contact_radius(depth: Any):
 
 @wp.func
 def relative_attraction(depth: Any):
-    """Shortfall of JKR's force against Hertz's at the same overlap, over pi W R*, from 5/6 to 3/2."""
+    """Return Hertz's force less JKR's at the same overlap, over pi W R*: 5/6 to 3/2."""
     p = relative_contact_radius(depth)
     shape = p * (p * p - type(depth)(3.0) * depth)
     if depth > type(depth)(0.0):
@@ -55,7 +55,7 @@ def relative_attraction(depth: Any):
 
 @wp.func
 def jkr_attraction(params: Any, contact: Any, memory: Any, at: int):
-    """Hertz's force less JKR's [N]; none before the surfaces touch."""
+    """Return Hertz's force less JKR's [N]; 0 before the surfaces touch."""
     work = params.work_of_adhesion
     zero = type(work)(0.0)
     if work <= zero:
@@ -70,7 +70,7 @@ def jkr_attraction(params: Any, contact: Any, memory: Any, at: int):
 
 @dataclass(frozen=True, kw_only=True)
 class JKR(Mechanism):
-    """Elastic spheres that adhere, on a contact area that adhesion makes larger.
+    """Adhesion of elastic spheres, on a contact area that it enlarges.
 
     Notes
     -----
@@ -80,16 +80,14 @@ class JKR(Mechanism):
         d = a^2 / R* - sqrt(2 pi W a / E*)
 
     The surfaces adhere from their first touch (d = 0, F = -(4/3) pi W R*) down to d = -0.4725 s^2 / R*, with
-    s^3 = 2 pi W R*^2 / E*, where they part. The largest pull that the contact holds is (3/2) pi W R*; with no
-    load it rests at a^3 = 9 pi W R*^2 / (2 E*), d = a^2 / (3 R*). An impact loses
-    7.09 (W^5 R*^4 / E*^2)^(1/3) [J] to it, or does not part the surfaces.
+    s^3 = 2 pi W R*^2 / E*, where they separate. The largest pull is (3/2) pi W R*; an unloaded contact rests
+    at a^3 = 9 pi W R*^2 / (2 E*), d = a^2 / (3 R*). An impact loses 7.09 (W^5 R*^4 / E*^2)^(1/3) [J] to it,
+    or does not separate the surfaces.
 
-    It acts as an attraction beside Hertz's force, so that damping and friction stay those of the base law:
-    they go by Hertz's contact at the same overlap, and end at d = 0, which a contact reaches under eight
-    ninths of its largest pull. With p = a / s and h = sqrt(d R*) / s the attraction, over pi W R*, is
-    (4/3) p (p + 2 h) / (p + h)^2 in an overlap and (4/3) p (p^2 - 3 d R* / s^2) beyond it.
-
-    A grain of several spheres adheres with each sphere that touches.
+    It is an attraction in addition to Hertz's force: damping and friction are those of Hertz's contact at the
+    same overlap and end at d = 0, under 8/9 of the largest pull. With p = a / s and h = sqrt(d R*) / s the
+    attraction, over pi W R*, is (4/3) p (p + 2 h) / (p + h)^2 in an overlap and (4/3) p (p^2 - 3 d R* / s^2)
+    beyond it. A grain of several spheres adheres with each sphere that touches.
 
     Sources: K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. A 324 (1971) 301-313; the contact
     radius in closed form after E. J. R. Parteli et al., Scientific Reports 4 (2014) 6227; the energy of an
@@ -97,7 +95,7 @@ class JKR(Mechanism):
     """
 
     work_of_adhesion: Annotated[float, Parameter("J/m^2", at_least=0.0)] = 0.0
-    """Work W that parts two surfaces: twice the surface energy of two like ones, W = 2 gamma."""
+    """Work W to separate two surfaces: twice the surface energy of equal ones, W = 2 gamma."""
 
     name: ClassVar[str] = "jkr"
     strength: ClassVar[str] = "work_of_adhesion"
@@ -107,6 +105,6 @@ class JKR(Mechanism):
     attraction: ClassVar[Any] = jkr_attraction
 
     def reach(self, largest_radius: float, modulus: float) -> float:
-        """Distance [m] at which two surfaces part, for the largest sphere on a wall."""
+        """Return the distance [m] at which two surfaces separate, for the largest sphere on a wall."""
         span = (2.0 * math.pi * self.work_of_adhesion * largest_radius**2 / modulus) ** (1.0 / 3.0)
         return PULL_OFF * span**2 / largest_radius

@@ -1,4 +1,4 @@
-"""Static and kinetic friction: a contact that slips is held by less than one that sticks."""
+"""Static and kinetic friction: a slipping contact has less friction than a sticking one."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -13,7 +13,7 @@ from dem_warp.parameters import Parameter
 def stick_or_slip(
     params: Any, contact: Any, coefficient: Any, spring: Any, support: Any, memory: Any, at: int
 ):
-    """Coefficient of a contact that sticks, or that slips; remembers which (1: it slips)."""
+    """Return the coefficient of a contact that sticks or slips; remember which (1: it slips)."""
     zero = type(coefficient)(0.0)
     one = type(coefficient)(1.0)
     kinetic = coefficient * (one - params.friction_drop)
@@ -33,8 +33,8 @@ class KineticFriction(Mechanism):
 
     Notes
     -----
-    A contact starts to slip when its tangential spring passes mu_s F_n. From then on the spring is held to
-    mu_k F_n, until the motion no longer stretches it to that: then the contact sticks, and takes mu_s F_n to
+    A contact starts to slip when its tangential spring passes mu_s F_n. Then the spring is limited to
+    mu_k F_n until the motion no longer stretches it to that; the contact then sticks and needs mu_s F_n to
     slip again.
 
     Source: Coulomb's two coefficients, with the state of each contact as in S. Luding, Granular Matter 10
@@ -42,7 +42,7 @@ class KineticFriction(Mechanism):
     """
 
     friction_drop: Annotated[float, Parameter("1", at_least=0.0, below=1.0)] = 0.0
-    """Part of the static friction that a slipping contact lacks, 1 - mu_k / mu_s."""
+    """Part of the static friction that a slipping contact loses, 1 - mu_k / mu_s."""
 
     name: ClassVar[str] = "kinetic_friction"
     strength: ClassVar[str] = "friction_drop"

@@ -1,4 +1,4 @@
-"""Every mechanism, by its name; a new one is its file and a line here."""
+"""All mechanisms by name; a new one needs its file and a line here."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ _ALL: Modules[type[Mechanism]] = Modules({
     "capillary_bridge": "dem_warp.laws.capillary:CapillaryBridge",
     "elastic_plastic_rolling": "dem_warp.laws.elastic_plastic_rolling:ElasticPlasticRolling",
     "twisting": "dem_warp.laws.twisting:Twisting",
-    # before kinetic friction, which compares the spring with the coefficient that holds at the present speed
+    # before kinetic friction, which compares the spring with the coefficient at the present speed
     "rate_weakening": "dem_warp.laws.rate_weakening:RateWeakening",
     "kinetic_friction": "dem_warp.laws.kinetic_friction:KineticFriction",
     "hysteretic_spring": "dem_warp.laws.hysteretic_spring:HystereticSpring",
@@ -21,17 +21,17 @@ _ALL: Modules[type[Mechanism]] = Modules({
 
 
 def _check(name: str, kind: type[Mechanism], known: Mapping[str, type[Mechanism]]) -> None:
-    """Check a law from outside: parameters of all laws are fields of one struct."""
+    """Check a law of a plugin: the parameters of all laws are fields of one struct."""
     require_kind(Mechanism, name, kind)
     taken = {parameter: other.name for other in known.values() for parameter in other.parameter_names()}
     if shared := [f"{p} of {taken[p]}" for p in kind.parameter_names() if p in taken]:
-        raise ValueError(f"must have parameters of its own, got {', '.join(shared)}")
+        raise ValueError(f"{kind.__name__}: parameter names must be unique, got {', '.join(shared)}")
 
 
 MECHANISMS = Registry("dem_warp.laws", _ALL, _check)
-"""Laws beside the base law, by name; those of plug-ins included."""
+"""Mechanisms by name, including those of plugins."""
 
 
 def parameters() -> tuple[str, ...]:
-    """Names of the parameters of all mechanisms; all different."""
+    """Return the names of the parameters of all mechanisms; all are different."""
     return tuple(name for mechanism in MECHANISMS.values() for name in mechanism.parameter_names())

@@ -1,4 +1,4 @@
-"""Micro-slip: the rim of a contact slips while its middle sticks, as in theory and unlike one spring."""
+"""Micro-slip: the rim of a contact slips while its middle sticks."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -10,7 +10,7 @@ from dem_warp.laws.tangential import coulomb_spring, limited
 from dem_warp.parameters import Parameter
 
 SPRINGS = 8
-"""Springs of the row, an even number."""
+"""Number of springs in the row, even."""
 
 _SPRINGS = wp.constant(SPRINGS)
 _EACH = wp.constant(1.0 / SPRINGS)
@@ -19,16 +19,16 @@ _HALF = wp.constant(3 * SPRINGS // 2)
 
 @wp.func
 def load_within(part: Any):
-    """Share of the normal force that the row bears within a part of the contact radius: (3 p - p^3) / 2."""
+    """Return the share of the normal force within a part p of the contact radius: (3 p - p^3) / 2."""
     return type(part)(0.5) * part * (type(part)(3.0) - part * part)
 
 
 @wp.func
 def fitted_width(memory: Any, at: int, reach: Any, is_loose: bool):
-    """Half width [m] of the row, fitted to a contact radius; after it, `memory` has the springs' forces [N].
+    """Return the half width [m] of the row for a contact radius; `memory` holds it and the spring forces [N].
 
-    The row of a loose contact, which bears nothing as yet, is as wide as the contact. One that has become too
-    narrow doubles: two springs become one, and the outer half is new.
+    The row of a new contact is as wide as the contact. A row that has become too narrow doubles: two springs
+    become one, and the outer half is new.
     """
     zero = type(reach)(0.0)
     width = memory[at]
@@ -49,7 +49,7 @@ def fitted_width(memory: Any, at: int, reach: Any, is_loose: bool):
 
 @wp.func
 def row_force(contact: Any, stiffness: Any, velocity: Any, limit: Any, memory: Any, at: int):
-    """Force [N] of the row; remembers contact radius, half width of the row and force of each spring."""
+    """Return the force [N] of the row; remember contact radius, half width and force of each spring."""
     zero = type(limit)(0.0)
     total = type(velocity)()
     reach = wp.sqrt(contact.radius * contact.overlap)
@@ -92,7 +92,7 @@ def row_or_spring(
     memory: Any,
     at: int,
 ):
-    """Tangential force [N] of the row, damped, and the displacement [m] of one spring of its force."""
+    """Return the damped tangential force [N] of the row and the displacement [m] of one equal spring."""
     if params.micro_slip <= type(limit)(0.0):
         return coulomb_spring(displacement, stiffness, damping_rate, velocity, limit)
     force = row_force(contact, stiffness, velocity, limit, memory, at)
@@ -104,31 +104,29 @@ def row_or_spring(
 
 @dataclass(frozen=True, kw_only=True)
 class MicroSlip(Mechanism):
-    """A contact slips from its rim inwards, in place of sticking or sliding as a whole.
+    """Slip of a contact from its rim inwards, in place of sticking or sliding as a whole.
 
     Notes
     -----
-    The contact is a row of springs along a line through its middle, each of which sticks or slips by itself
-    under the share of the normal force that it bears (method of dimensionality reduction). At the contact
-    radius a = sqrt(R* d), with stiffness S_t = 8 G* a and limit mu F_n of the base law, the part of the row
-    between x and x + dx from the middle, on both sides together, has
+    The contact is a row of springs along a line through its middle; each sticks or slips under its share of
+    the normal force (method of dimensionality reduction). At the contact radius a = sqrt(R* d), with
+    stiffness S_t = 8 G* a and limit mu F_n of the base law, the part of the row between x and x + dx from the
+    middle, on both sides together, has
 
         stiffness S_t dx / a,  limit (3/2) mu F_n (1 - x^2 / a^2) dx / a.
 
-    Infinitely many springs are the theory of Cattaneo and Mindlin for any history of both forces along one
-    line, and for an oblique impact that of Maw, Barber and Fawcett; on a path that turns, each spring is
-    dragged by its end. Eight, half of which the widest contact so far presses at the least, come to within
-    4 % of that theory in the slip after the impact over the slip before. A spring of the rim that is but
-    partly pressed bears its part, and what parts lets go its force. The base law's tangential damping comes
-    on top, and the sum stays within mu F_n. In gross sliding the force is that of the base law. A contact
-    remembers 26 values.
+    Infinitely many springs give the theory of Cattaneo and Mindlin for any history of both forces along one
+    line, and for an oblique impact that of Maw, Barber and Fawcett; on a curved path, each spring is dragged
+    by its end. Eight springs are within 4 % of that theory (slip after the impact over slip before). A spring
+    at the rim carries the pressed part of its force. The base law's tangential damping is added, and the sum
+    stays within mu F_n. In gross sliding the force is that of the base law. A contact remembers 26 values.
 
     Source: V. L. Popov and M. Hess, Method of Dimensionality Reduction in Contact Mechanics and Friction,
     Springer (2015); R. D. Mindlin and H. Deresiewicz, Journal of Applied Mechanics 20 (1953) 327-344.
     """
 
     micro_slip: Annotated[float, Parameter("1", at_least=0.0, at_most=1.0)] = 0.0
-    """1 with it, 0 without."""
+    """1: with micro-slip; 0: without."""
 
     name: ClassVar[str] = "micro_slip"
     strength: ClassVar[str] = "micro_slip"

@@ -1,4 +1,4 @@
-"""Friction that weakens with the speed of sliding."""
+"""Friction that weakens with the sliding speed."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -11,7 +11,7 @@ from dem_warp.parameters import Parameter
 
 @wp.func
 def weakened(params: Any, contact: Any, coefficient: Any, spring: Any, support: Any, memory: Any, at: int):
-    """Coefficient of friction at the present speed of sliding."""
+    """Return the coefficient of friction at the present sliding speed."""
     one = type(coefficient)(1.0)
     if params.weakening > type(coefficient)(0.0):
         velocity = contact.velocity - contact.normal * wp.dot(contact.velocity, contact.normal)
@@ -26,7 +26,7 @@ class RateWeakening(Mechanism):
 
     Notes
     -----
-    mu(v) = mu (1 - weakening (1 - exp(-v / v_0))), where v is the speed of the one surface along the other.
+    mu(v) = mu (1 - weakening (1 - exp(-v / v_0))), where v is the sliding speed.
 
     Source: the "static-kinetic exponential decay" of the Abaqus Analysis User's Guide, mu_k + (mu_s - mu_k)
     exp(-v / v_0); the form also in Constantinou, Mokha and Reinhorn, Journal of Structural Engineering 116
@@ -34,9 +34,9 @@ class RateWeakening(Mechanism):
     """
 
     weakening: Annotated[float, Parameter("1", at_least=0.0, below=1.0)] = 0.0
-    """Part of the friction that is lost at high speed."""
+    """Part of the friction lost at high speed."""
     weakening_speed: Annotated[float, Parameter("m/s", at_least=0.0)] = 0.0
-    """Speed v_0 at which 63 % of that is lost; above 0 where something is lost."""
+    """Speed v_0 at which 63 % of that is lost; must be above 0 if weakening is."""
 
     name: ClassVar[str] = "rate_weakening"
     strength: ClassVar[str] = "weakening"
@@ -45,7 +45,4 @@ class RateWeakening(Mechanism):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.weakening > 0.0 and self.weakening_speed == 0.0:
-            raise ValueError(
-                f"{type(self).__name__}.weakening_speed: must be above 0 where weakening is, "
-                f"got {self.weakening_speed!r}"
-            )
+            raise ValueError("RateWeakening.weakening_speed: must be above 0 if weakening is, got 0.0")

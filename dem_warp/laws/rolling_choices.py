@@ -1,8 +1,8 @@
-"""Resistance to rolling, choice by choice; `conventions.Rolling` names them.
+"""Laws of rolling resistance; `conventions.Rolling` names them.
 
-Each acts on the relative rotation of the two bodies, but EDEM's RVD on the mean of their spins and
-DEM-Engine's on what rotation moves their surfaces at. Choices that act on a grain's own spin are limits for
-the integration (`rolling.resist_spin`).
+Each acts on the relative rotation of the two bodies, except EDEM's RVD (mean of their spins) and DEM-Engine's
+(sliding velocity of the spins). Choices that act on a grain's own spin are limits for the integration
+(`rolling.resist_spin`).
 """
 
 from collections.abc import Mapping
@@ -21,31 +21,31 @@ from dem_warp.laws.tangential import (
 )
 
 STEP_SHARE = wp.constant(0.05)
-"""Stiffness of the spring that holds under `relative_constant`, over inertia / step^2: a grain of a pile has
-a dozen contacts or more, and 4 would be too much for them together."""
+"""Stiffness of the holding spring of `relative_constant`, over inertia / step^2: a grain in a pile has a
+dozen contacts or more, and all together must stay below 4."""
 
 DASHPOT_SHARE = wp.constant(0.2)
-"""Its dashpot over inertia / step: a damping ratio of 0.45."""
+"""Dashpot of that spring over inertia / step: a damping ratio of 0.45."""
 
 SOLID_SPHERE = wp.constant(2.5)
 """m R^2 / I of a solid sphere."""
 
 UNLIMITED = wp.constant(1.0e30)
-"""More than any torque [N m]."""
+"""Limit above any torque [N m]."""
 
 EXACT_RATIO = wp.constant(1.8257418583505538)
-"""2 sqrt(5/6): the constant of the damping over |beta|."""
+"""Constant 2 sqrt(5/6) of the damping over |beta|."""
 
 
 @wp.func
 def roll_of(contact: Any):
-    """Part of the relative rotation [rad/s] in the contact's plane."""
+    """Return the part of the relative rotation [rad/s] in the contact's plane."""
     return contact.spin - contact.normal * wp.dot(contact.spin, contact.normal)
 
 
 @wp.func
 def recalled(contact: Any, memory: Any, at: int):
-    """Three remembered values as a vector, zero in a new contact."""
+    """Return three remembered values as a vector, zero in a new contact."""
     value = type(contact.normal)(memory[at], memory[at + 1], memory[at + 2])
     if contact.is_new:
         value = type(contact.normal)()
@@ -54,8 +54,7 @@ def recalled(contact: Any, memory: Any, at: int):
 
 @wp.func
 def wound_torque(contact: Any, torque: Any, stiffness: Any, limit: Any, memory: Any, at: int):
-    """Torque [N m] of a spring without dashpot, wound on from the remembered `torque`, and no larger than a
-    limit."""
+    """Advance the remembered torque [N m] of a spring without dashpot, limited; remember and return it."""
     torque = limited(torque - roll_of(contact) * (stiffness * contact.time_step), limit)
     for i in range(3):
         memory[at + i] = torque[i]
@@ -64,12 +63,11 @@ def wound_torque(contact: Any, torque: Any, stiffness: Any, limit: Any, memory: 
 
 @wp.func
 def constant_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
-    """Torque mu_r R* F_n [N m] against the roll; what does not ask for as much is held.
+    """Return the torque mu_r R* F_n [N m] against the roll; at rest a spring holds the grain.
 
-    It holds by the stiffest spring that the step allows, damped: as the step gets shorter, rigid and then
-    plastic. The inertia is that of solid spheres.
+    The spring is the stiffest that the step allows, damped. The inertia is that of solid spheres.
 
-    Source: model A of Ai et al., Powder Technology 206 (2011) 269-282, which says nothing of rest.
+    Source: model A of Ai et al., Powder Technology 206 (2011) 269-282, which does not define rest.
     """
     one = type(load)(1.0)
     roll = roll_of(contact)
@@ -85,7 +83,7 @@ def constant_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
 
 @wp.func
 def rvd_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
-    """Torque mu_r R* F_n [N m] against the mean of the two spins in the contact's plane, on both alike.
+    """Return the torque mu_r R* F_n [N m] against the mean spin in the contact's plane, the same on both.
 
     On a wall it is the grain's own spin. It acts for whole steps.
 
@@ -104,9 +102,9 @@ def rvd_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
 
 @wp.func
 def cdt_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
-    """Torque mu_r R* F_n [N m] against the relative rotation for the whole step, less its normal part.
+    """Return the torque mu_r R* F_n [N m] against the relative rotation, less its normal part.
 
-    F_n is the elastic force. It reverses a slow roll each step, so that a grain that ought to stand creeps.
+    F_n is the elastic force. It reverses a slow roll each step, so that a grain at rest creeps.
 
     Source: LIGGGHTS-PUBLIC 3.8.0, src/rolling_model_cdt.h, lines 89-162.
     """
@@ -119,7 +117,9 @@ def cdt_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
 
 @wp.func
 def epsd2_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
-    """Torque [N m] of a spring S_t R*^2 without dashpot, at most mu_r R* |F_n|; it does not turn along.
+    """Return the torque [N m] of a spring S_t R*^2 without dashpot, at most mu_r R* |F_n|.
+
+    The remembered torque does not turn with the contact.
 
     Source: LIGGGHTS-PUBLIC 3.8.0, src/rolling_model_epsd2.h, lines 161-226.
     """
@@ -131,7 +131,7 @@ def epsd2_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
 
 @wp.func
 def rocky_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
-    """Torque [N m] of a spring S_t R_r^2 without dashpot, at most mu_r R_r F_n.
+    """Return the torque [N m] of a spring S_t R_r^2 without dashpot, at most mu_r R_r F_n.
 
     R_r is the reduced distance of the contact from the two centres of mass, 1/R_r = 1/l_i + 1/l_j.
 
@@ -150,10 +150,9 @@ def rocky_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
 
 @wp.func
 def yade_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
-    """Torque [N m] of a spring of one stiffness [N m/rad] without dashpot, at most mu_r R* F_n.
+    """Return the torque [N m] of a spring of constant stiffness [N m/rad], at most mu_r R* F_n.
 
-    It has no limit where there is no normal force, in the overlap that a clamped damping leaves at the end of
-    an impact: the source limits it only `if (MomentMax > 0)`.
+    Without normal force (after a clamped impact) there is no limit: the source has `if (MomentMax > 0)`.
 
     Source: Yade, pkg/dem/HertzMindlin.cpp, Law2_ScGeom_MindlinPhys_Mindlin::go, "MOMENT CONTACT LAW" (krot;
     eta, the limit over the mean radius and the normal force).
@@ -168,7 +167,7 @@ def yade_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
 
 @wp.func
 def sds_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
-    """Torque [N m] of a spring k and dashpot gamma at the lever R*, their sum at most mu_r R* |F_n|.
+    """Return the torque [N m] of a spring k and dashpot gamma at the lever R*, at most mu_r R* |F_n|.
 
     Source: LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 550-617; S. Luding, Granular Matter 10
     (2008) 235-246.
@@ -187,10 +186,10 @@ def sds_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
 
 @wp.func
 def deme_couple(params: Any, contact: Any, load: Any, memory: Any, at: int):
-    """Force mu_r |F_n| [N] that only turns, each grain at its own lever, against what the spins slide.
+    """Return a force mu_r |F_n| [N] that only turns, each grain at its own lever, against the spins' sliding.
 
-    It begins when the contact is older than an impact lasts. That duration is the source's, which leaves out
-    that the stiffness grows with the root of the overlap: it is in SI units.
+    It begins when the contact is older than an impact. The duration is the source's, in SI units, which
+    neglects that the stiffness grows with the root of the overlap.
 
     Source: DEM-Engine 3.0.19, kernel/DEMCustomizablePolicies/FullHertzianForceModel.cu, "Rolling resistance
     part"; the torque, ForceInKernelReductionStrat.cu.
@@ -216,15 +215,15 @@ def deme_couple(params: Any, contact: Any, load: Any, memory: Any, at: int):
 
 @dataclass(frozen=True)
 class RollingChoice:
-    """A resistance to rolling that is a torque of the contact."""
+    """Rolling resistance that is a torque of the contact."""
 
     torque: Any
-    """Device function of ContactParams, Contact, load [N], memory and place in it: torque [N m] on the grain;
-    or, of one that turns each grain at its own lever, the force [N]."""
+    """Device function of ContactParams, Contact, load [N], memory and index in it. It returns the torque
+    [N m] on the grain, or the force [N] if each grain turns at its own lever."""
     load: str = "push"
-    """Load: the normal force where it pushes, its `size`, or its `elastic` part."""
+    """Normal force where it pushes, its absolute value (`size`), or its `elastic` part."""
     memory_size: int = 0
-    """Values that it remembers of a contact."""
+    """Values remembered of a contact."""
 
 
 ROLLING: Mapping[str, RollingChoice] = {
@@ -238,4 +237,4 @@ ROLLING: Mapping[str, RollingChoice] = {
     "yade": RollingChoice(yade_torque, "size", 3),
     "deme": RollingChoice(deme_couple, "size", 1),
 }
-"""Choices that are torques of a contact, by name; the others are limits of a grain's own spin."""
+"""Rolling laws that are torques of a contact, by name; the others limit a grain's own spin."""

@@ -7,7 +7,7 @@ import warp as wp
 
 @wp.func
 def mindlin_stiffness(shear_modulus: Any, radius: Any, overlap: Any):
-    """Tangential stiffness S_t = 8 G* sqrt(R* d) [N/m].
+    """Return the tangential stiffness S_t = 8 G* sqrt(R* d) [N/m].
 
     Source: Mindlin, Journal of Applied Mechanics 16 (1949) 259-268.
     """
@@ -16,13 +16,13 @@ def mindlin_stiffness(shear_modulus: Any, radius: Any, overlap: Any):
 
 @wp.func
 def advance_displacement(displacement: Any, normal: Any, tangential_velocity: Any, time_step: Any):
-    """Tangential displacement [m] after a step: turned into the contact's present plane, then moved along."""
+    """Return the tangential displacement [m] after a step: turned into the contact's plane, then advanced."""
     return displacement - normal * wp.dot(displacement, normal) + tangential_velocity * time_step
 
 
 @wp.func
 def limited(force: Any, limit: Any):
-    """A force [N], no larger than a limit."""
+    """Return a force [N] reduced to a limit."""
     size = wp.length(force)
     if size > limit:
         force = force * (limit / size)
@@ -33,10 +33,10 @@ def limited(force: Any, limit: Any):
 def coulomb_spring(
     displacement: Any, stiffness: Any, damping_rate: Any, tangential_velocity: Any, limit: Any
 ):
-    """Tangential force [N] and displacement [m] under the Coulomb limit |F_t| <= mu F_n.
+    """Return tangential force [N] and displacement [m] under the Coulomb limit |F_t| <= mu F_n.
 
-    The spring slides when it alone passes the limit; then its displacement shrinks to what the limit holds
-    and the damping is left out. A spring within the limit is damped, and the sum is limited again.
+    The spring slides when it alone passes the limit; its displacement then shrinks to the limit, without
+    damping. A spring within the limit is damped, and the sum is limited again.
 
     Source: Cundall and Strack, Geotechnique 29 (1979) 47-65; EDEM 2.7 Theory Reference Guide.
     """
@@ -57,9 +57,9 @@ def coulomb_spring(
 
 @wp.func
 def free_spring(displacement: Any, stiffness: Any, damping_rate: Any, tangential_velocity: Any, limit: Any):
-    """Tangential force [N] and displacement [m] of a spring under the Coulomb limit, its damping under none.
+    """Return tangential force [N] and displacement [m] of a spring under the Coulomb limit.
 
-    A spring that slides is not damped.
+    The damping has no limit; a sliding spring has no damping.
 
     Source: LIGGGHTS-PUBLIC 3.8.0, src/tangential_model_history.h, lines 161-218; Yade,
     pkg/dem/HertzMindlin.cpp, Law2_ScGeom_MindlinPhys_Mindlin::go, "MOHR-COULOMB law".
@@ -77,9 +77,9 @@ def free_spring(displacement: Any, stiffness: Any, damping_rate: Any, tangential
 
 @wp.func
 def sum_spring(displacement: Any, stiffness: Any, damping_rate: Any, tangential_velocity: Any, limit: Any):
-    """Tangential force [N] and displacement [m] of spring and damping whose sum is under the Coulomb limit.
+    """Return tangential force [N] and displacement [m]; the sum of spring and damping is limited.
 
-    Where it slides, the displacement becomes what makes the sum equal to the limit.
+    In sliding, the displacement is set so that the sum equals the limit.
 
     Source: LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 494-533; DEM-Engine 3.0.19,
     FullHertzianForceModel.cu, "Tangential force part"; S. Luding, Granular Matter 10 (2008) 235-246.
@@ -95,7 +95,7 @@ def sum_spring(displacement: Any, stiffness: Any, damping_rate: Any, tangential_
 
 @wp.func
 def stretch_of(force: Any, stiffness: Any):
-    """Displacement [m] of a spring from its force [N], which a contact remembers in its place.
+    """Return the displacement [m] of a spring from its remembered force [N].
 
     Source: Yade, pkg/dem/HertzMindlin.cpp, Law2_ScGeom_MindlinPhys_Mindlin::go, "SHEAR FORCE"; LAMMPS
     (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 483-489, tangential mindlin/force.
@@ -107,7 +107,7 @@ def stretch_of(force: Any, stiffness: Any):
 
 @wp.func
 def unloaded(contact: Any, history: Any, memory: Any, at: int):
-    """Displacement [m] or force [N] of the spring, scaled down by what the contact radius has just shrunk.
+    """Return the displacement [m] or force [N] of the spring, reduced as the contact radius shrinks.
 
     Source: LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 434-446, tangential mindlin_rescale;
     C. Thornton, S. J. Cummins and P. W. Cleary, Powder Technology 233 (2013) 30-46.

@@ -1,4 +1,4 @@
-"""Twisting resistance: a spring and a slider against the spin about the contact's normal."""
+"""Twisting resistance: a spring and a slider against the spin about the contact normal."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -12,7 +12,7 @@ from dem_warp.parameters import Parameter
 
 @wp.func
 def twist_torque(params: Any, contact: Any, support: Any, memory: Any, at: int):
-    """Torque [N m] against the twist; remembers how far [rad] the spring is wound up."""
+    """Return the torque [N m] against the twist; remember the angle [rad] of the spring."""
     overlap = contact.overlap
     angle = memory[at]
     if contact.is_new:
@@ -31,27 +31,26 @@ def twist_torque(params: Any, contact: Any, support: Any, memory: Any, at: int):
 
 @dataclass(frozen=True, kw_only=True)
 class Twisting(Mechanism):
-    """A contact resists to being twisted, by the friction of its area.
+    """Resistance of a contact to twisting, by the friction of its area.
 
     Notes
     -----
     With b = twisting_radius a and the twist psi [rad], the relative rotation about the normal since the
     contact was made:
 
-        M = -(b^2 / 2) (S_t psi + c_t dpsi/dt)  while the spring is within (2/3) b mu F_n, and |M| no more
-        than that; beyond, psi slides back to what the limit holds.
+        M = -(b^2 / 2) (S_t psi + c_t dpsi/dt),  |M| <= (2/3) b mu F_n,
 
-    S_t and c_t are the tangential stiffness and damping of the base law: every point of the area is held by
-    the tangential spring's share of it. The limit is that of a uniform pressure; Hertz's gives 3 pi / 16 in
-    place of 2/3. Sliding and twisting are limited each by itself.
+    where psi slides back to the limit. S_t and c_t are the tangential stiffness and damping of the base law.
+    The limit is that of a uniform pressure; Hertz's gives 3 pi / 16 in place of 2/3. Sliding and twisting
+    have separate limits.
 
     Source: J. S. Marshall, Journal of Computational Physics 228 (2009) 1541-1561; as a spring
     and slider also S. Luding, Granular Matter 10 (2008) 235-246.
     """
 
     twisting_radius: Annotated[float, Parameter("1", at_least=0.0)] = 0.0
-    """Radius of the area that resists over that of the Hertz contact, a = sqrt(R* d): 1 for smooth spheres,
-    more where a sphere stands for a flatter surface."""
+    """Radius of the resisting area over that of the Hertz contact, a = sqrt(R* d): 1 for smooth spheres,
+    more where a sphere represents a flatter surface."""
 
     name: ClassVar[str] = "twisting"
     strength: ClassVar[str] = "twisting_radius"

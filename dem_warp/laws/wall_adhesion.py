@@ -1,4 +1,4 @@
-"""Adhesion to walls alone, in proportion to the contact area."""
+"""Adhesion to walls only, in proportion to the contact area."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -7,29 +7,21 @@ import warp as wp
 
 from dem_warp.laws.linear_cohesion import contact_area
 from dem_warp.laws.mechanism import Between, Mechanism
-from dem_warp.parameters import Parameter
+from dem_warp.parameters import Parameter, require_choice
 
 
 @wp.func
 def wall_attraction(params: Any, contact: Any, memory: Any, at: int):
-    """Attraction k_w A [N] with A = 2 pi R* d."""
+    """Return the attraction k_w A [N] with A = 2 pi R* d."""
     return params.wall_adhesion_energy_density * contact_area(contact)
 
 
 @dataclass(frozen=True, kw_only=True)
 class WallAdhesion(Mechanism):
-    """Walls attract grains as `LinearCohesion` attracts surfaces, with a strength of their own.
+    """Attraction of grains to walls, as `LinearCohesion` with its own strength.
 
-    It is a mechanism beside the cohesion of the grains, so that a case may have either, or both, and a study
-    may vary them apart.
+    A case may have either or both, and a study may vary them separately.
 
-    Raises
-    ------
-    ValueError
-        If `between` is not "walls".
-
-    Notes
-    -----
     Source: LIGGGHTS documentation, "gran cohesion sjkr", for pairs of a grain and a wall.
     """
 
@@ -43,5 +35,4 @@ class WallAdhesion(Mechanism):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.between != "walls":
-            raise ValueError(f"WallAdhesion.between: must be 'walls', got {self.between!r}")
+        require_choice("WallAdhesion.between", self.between, ("walls",))

@@ -1,4 +1,4 @@
-"""Means over time of a fluctuating quantity, with standard errors that know how long it remembers."""
+"""Means over time of a fluctuating quantity, with standard errors that include its autocorrelation."""
 
 from typing import NamedTuple
 
@@ -6,33 +6,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 WINDOW = 5.0
-"""The autocorrelation is summed up to this many times the integrated time that is found (Sokal's rule)."""
+"""Window of the autocorrelation sum over the integrated autocorrelation time (Sokal's rule)."""
 
 LEAST_LOOKS = 4
-"""A series of fewer looks has no standard error."""
+"""Least length of a series with a standard error."""
 
 
 class MeanOverTime(NamedTuple):
-    """Mean of a stationary series, and what is known of its error."""
+    """Mean of a stationary series with its standard error."""
 
     mean: float
     standard_error: float
     freedom: float
-    """Degrees of freedom of the standard error: an interval takes Student's t of as many."""
+    """Degrees of freedom of the standard error, for Student's t."""
     memory: float
-    """Integrated autocorrelation time, in looks; a half for a series without memory."""
+    """Integrated autocorrelation time, in looks; 0.5 for a series without memory."""
 
 
 def mean_over_time(series: ArrayLike) -> MeanOverTime | None:
-    """Average a series of equally spaced looks; None for fewer than LEAST_LOOKS.
+    """Average a stationary series of equally spaced looks; return None for fewer than LEAST_LOOKS.
 
-    The variance of the mean is 2 tau / n times that of a look, tau the integrated autocorrelation time. It is
-    corrected to first order for the mean having been taken from the same series.
-
-    Parameters
-    ----------
-    series : (n,) array
-        Looks in their order, of one quantity that drifts no more.
+    The variance of the mean is 2 tau / n times that of a look, with the integrated autocorrelation time tau.
+    It is corrected to first order for using the mean of the same series.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""The draw-down test: a box runs out through a slot in its floor; slopes stay above, a heap forms below."""
+"""The draw-down test: a box empties through a slot in its floor; slopes stay above, a heap forms below."""
 
 import math
 from collections.abc import Mapping
@@ -21,17 +21,17 @@ from dem_warp.walls import Mesh, Plane, Wall
 
 GATE = 2
 OVER_SLOT = 0.25
-"""Grains nearer to the middle than this part of the slot's width are above its middle."""
+"""Half width of the middle of the slot over its width."""
 
-_FLANK = "of the least-squares line through the part that rises from 10 to 90 % of its height"
+_FLANK = "least-squares line from 10 to 90 % of its height"
 
 
 @dataclass(frozen=True)
 class DrawDown(PouredScene):
-    """A box is filled by a rain of grains; a slot across the middle of its floor opens at once.
+    """Discharge of a box, filled by a rain of grains, through a slot across the middle of its floor.
 
-    What stays in the box forms two slopes down to the slot. What falls forms a heap in the box below, which
-    has the same width and depth. The slot is along y, so that the test may be cut to a thin slice.
+    The grains that stay form two slopes down to the slot. The fallen grains form a heap in the box below, of
+    the same width and depth. The slot is along y, so that the test may be a thin slice.
     """
 
     width: Annotated[float, Parameter("m", above=0.0)]
@@ -55,13 +55,15 @@ class DrawDown(PouredScene):
         | {
             "shear_angle": Observable("deg", "mean of the two slopes above"),
             "shear_angle_left": Observable(
-                "deg", f"slope above at -x, {_FLANK}; absent where it rises by less than two grains"
+                "deg", f"slope above at -x, {_FLANK}; absent if it rises by less than two grains"
             ),
-            "shear_angle_right": Observable("deg", "the same at +x"),
+            "shear_angle_right": Observable("deg", "slope above at +x, in the same way"),
             "repose_angle": Observable("deg", "mean of the two flanks of the heap below"),
-            "repose_angle_left": Observable("deg", f"flank of the heap at -x, {_FLANK}; absent likewise"),
-            "repose_angle_right": Observable("deg", "the same at +x"),
-            "mass_left_left": Observable("kg", "what of `mass_left` lies at -x"),
+            "repose_angle_left": Observable(
+                "deg", f"flank of the heap at -x, {_FLANK}; absent if it rises by less than two grains"
+            ),
+            "repose_angle_right": Observable("deg", "flank of the heap at +x, in the same way"),
+            "mass_left_left": Observable("kg", "part of `mass_left` at -x"),
         }
     )
 
@@ -74,12 +76,12 @@ class DrawDown(PouredScene):
 
     @property
     def floor(self) -> float:
-        """Of the upper box [m]."""
+        """Floor of the upper box [m]."""
         return self.drop
 
     @property
     def brim(self) -> float:
-        """Height that the upper box is filled to [m]."""
+        """Height of the filling of the upper box [m]."""
         return self.drop + self.fill_depth
 
     @property
@@ -88,15 +90,15 @@ class DrawDown(PouredScene):
         return self.slot
 
     def volume_below(self, height: float) -> float:
-        """Volume of the upper box up to a height [m3]."""
+        """Return the volume of the upper box up to a height [m3]."""
         return self.width * self.depth * (height - self.drop)
 
     def cross_section(self, reach: float) -> CrossSection:
-        """Inside the boxes."""
+        """Return the inside of the boxes."""
         return CrossSection((self.width / 2, self.depth / 2))
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
-        """The lower floor; the sides, up to above the release, and with them the upper floor; the gate."""
+        """Return the lower floor; the sides, up to above the release, with the upper floor; the gate."""
         x, y, top, gap = self.width / 2, self.depth / 2, self.release(reach) + 2 * reach, self.slot / 2
         ring = [(-x, -y), (x, -y), (x, y), (-x, y)]
         sides = [
@@ -110,53 +112,53 @@ class DrawDown(PouredScene):
         )
 
     def _shelf(self, start: float, end: float) -> list[tuple[float, float, float]]:
-        """Corners of a plate of the upper floor between two x [m]."""
+        """Return the corners of a plate of the upper floor between two x [m]."""
         y, z = self.depth / 2, self.drop
         return [(start, -y, z), (end, -y, z), (end, y, z), (start, y, z)]
 
     def room(self, reach: float) -> tuple[float, float, float]:
-        """Both boxes."""
+        """Return the space of both boxes."""
         return self.width / 2 + 2 * reach, self.depth / 2 + 2 * reach, -2 * reach
 
     def controller(self, case: Case[Any], setup: WorldSetup, chunk: int) -> "DrawDownController":
-        """Controller of one case."""
+        """Return the controller of one case."""
         return DrawDownController(case, setup, chunk)
 
 
 class DrawDownController(DischargeController):
-    """Phases of one draw-down: fill, settle, open, discharge."""
+    """Controller of a draw-down."""
 
     gate = GATE
 
     @property
     def gate_path(self) -> float:
-        """To below the lower floor [m]."""
+        """End of the gate's path, below the lower floor [m]."""
         return self.case.scene.drop + 2.0 * self.reach
 
     @property
     def expected_discharge(self) -> float:
-        """After Beverloo's law for a slot, without the correction for the grains [s]."""
+        """Duration by Beverloo's law for a slot, for grains of size 0 [s]."""
         box = self.case.scene
         return box.volume / (math.sqrt(GRAVITY) * box.depth * box.slot**1.5) + 0.3
 
     def came_out(self, view: WorldView) -> np.ndarray:
-        """Below the upper floor."""
+        """Mark the grains below the upper floor."""
         return view.alive & (view.positions[:, 2] < self.case.scene.drop)
 
     def over_outlet(self, view: WorldView) -> np.ndarray:
-        """Near the plane in the middle of the slot."""
+        """Mark the grains near the middle plane of the slot."""
         return np.abs(view.positions[:, 0]) < OVER_SLOT * self.case.scene.slot
 
     def why_clogged(self, view: WorldView) -> str:
-        """The heap stopped the flow, or an arch did."""
+        """Return the reason of the failure: the heap stopped the flow, or an arch did."""
         box, (x, _, z) = self.case.scene, view.positions.T
         under = self.came_out(view) & (np.abs(x) < box.slot / 2) & (z > box.drop - 2 * self.reach)
         if under.any():
-            return "the heap has grown up to the slot: raise the drop, or lower the fill"
+            return "the heap has reached the slot: raise drop, or lower fill_depth"
         return super().why_clogged(view)
 
     def measure(self, view: WorldView) -> dict[str, float]:
-        """The slopes above and the heap below."""
+        """Measure the slopes above and the heap below."""
         below = self.came_out(view)
         above = view.alive & ~below
         left = view.masses[above & (view.positions[:, 0] < 0)].sum()
@@ -167,7 +169,7 @@ class DrawDownController(DischargeController):
         )
 
     def _angles(self, name: str, positions: np.ndarray) -> dict[str, float]:
-        """Slopes of a bed to either side of the middle that can be seen, and their mean where both can."""
+        """Return the measurable slopes of a bed on both sides of the middle, and their mean if both are."""
         if not len(positions):
             return {}
         reach = self.grain_reach

@@ -1,4 +1,4 @@
-"""The surface of a bed in a drum, as different pictures show it: the volume below it, and its slopes."""
+"""The surface of a bed in a drum in different pictures: the volume below it, and its slopes."""
 
 import math
 from typing import Literal, NamedTuple
@@ -8,21 +8,21 @@ import numpy as np
 from dem_warp.scenes.surfaces import TOP_OF_GRAIN, column_tops, profile, slope
 
 SURFACE = 0.8
-"""The slope is fitted over this part of the surface's chord, clear of the drum's wall at both ends."""
+"""Part of the surface's chord that the slope is fitted to, away from the drum's wall."""
 
 FINER = 4
-"""Strips that a column of the bed is cut into where the shell bounds it."""
+"""Strips per column of the bed where the shell bounds it."""
 
 STATIONS = (-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
-"""Places across a drum, over its radius, at which the height of the surface is told."""
+"""Places across a drum, over its radius, where the height of the surface is measured."""
 
 Picture = Literal["depth", "silhouette", "end"]
-"""Pictures that a surface is read from: the mean over the drum's depth, the outline against a light behind
-it, and the grains that lie against the transparent end."""
+"""Pictures of a surface: the mean over the drum's depth, the outline against a light behind it, and the
+grains at the transparent end."""
 
 
 class SurfaceAngles(NamedTuple):
-    """Slopes of a bed at one look [deg], as the observables of `Drum` define them."""
+    """Slopes of a bed at one look [deg]; see the observables of `Drum`."""
 
     dynamic_angle: float
     upper_angle: float
@@ -31,24 +31,20 @@ class SurfaceAngles(NamedTuple):
 
 
 class DrumView(NamedTuple):
-    """A drum, and the picture that is taken of it."""
+    """A drum and the picture of it."""
 
     radius: float
     length: float
-    """Inner ones [m]."""
+    """Inner radius and length [m]."""
     picture: Picture = "depth"
     camera_distance: float | None = None
-    """From the front end to the camera, on the axis; None: from so far that nothing narrows [m]."""
+    """Distance of the camera from the front end, on the axis [m]; None: infinite."""
 
     def seen(self, positions: np.ndarray, reach: float) -> np.ndarray:
-        """Grains that the picture shows, where it shows them.
+        """Return the grains in the picture at their places in it.
 
-        Parameters
-        ----------
-        positions : (n, 3) array
-            Grain centres from the middle of the drum, whose axis is along y; the camera looks from -y [m].
-        reach : float
-            Bounding radius of a grain [m].
+        `positions` (n, 3) are centres from the middle of the drum, whose axis is along y, with the camera at
+        -y; `reach` is the bounding radius of a grain [m].
         """
         if self.picture == "depth":
             return positions
@@ -61,23 +57,15 @@ class DrumView(NamedTuple):
 
 
 def half_chord(level: float, radius: float) -> float:
-    """Half the width of a drum at a height above its lowest line [m]."""
+    """Return half the width of a drum at a height above its lowest line [m]."""
     return math.sqrt(max(level * (2 * radius - level), 0.0))
 
 
 def bed_volume(positions: np.ndarray, radius: float, length: float, reach: float) -> float:
-    """Volume of a drum below the surface of a bed, whatever the shape of that [m3].
+    """Return the volume of a drum below the surface of a bed of any shape [m3].
 
-    Each column of a grain's size is filled up to half a grain above its highest centre, within the shell.
-
-    Parameters
-    ----------
-    positions : (n, 3) array
-        Grain centres from the middle of the drum, whose axis is along y [m].
-    radius, length : float
-        Inner ones of the drum [m].
-    reach : float
-        Bounding radius of a grain [m].
+    Each column of a grain's size is filled up to half a grain above its highest centre, within the shell of a
+    radius and length [m]. `positions` and `reach` are as in `DrumView.seen`.
     """
     if not len(positions):
         return 0.0
@@ -94,30 +82,20 @@ def bed_volume(positions: np.ndarray, radius: float, length: float, reach: float
 def surface_angles(
     positions: np.ndarray, chord: float, reach: float, view: DrumView | None = None
 ) -> SurfaceAngles | None:
-    """Slopes of the bed in a drum; None where a part of its surface is too short for a line.
-
-    The bed is turned back by the angle of its centre of mass, so that its surface is nearly level and steep
-    parts can be seen as well as flat ones.
+    """Return the slopes of the bed in a drum; None if a part of its surface is too short for a line.
 
     Parameters
     ----------
-    positions : (n, 3) array
-        Grain centres from the middle of the drum, whose axis is along y; the bed is high at -x [m].
+    positions, reach
+        As in `DrumView.seen`; the bed is high at -x.
     chord : float
-        Half the length of the surface in the cross-section [m]; what a picture of the end shows has its own.
-    reach : float
-        Bounding radius of a grain [m].
+        Half the length of the surface in the cross-section [m]; a picture of the end uses its own.
     view : DrumView, optional
-        The drum and the picture; left out: the mean over the depth.
+        The drum and the picture. Default: the mean over the depth.
     """
-    if not len(positions):
+    if (levelled := _levelled(positions, reach, view)) is None:
         return None
-    center = positions.mean(axis=0)
-    turn = math.atan2(-center[0], -center[2])
-    level = _turned_back(positions if view is None else view.seen(positions, reach), turn)
-    if not len(level):
-        return None
-    along, height = profile(level, reach)
+    turn, along, height = levelled
     if view is not None and view.picture == "end":
         wall = np.sqrt(np.maximum(view.radius**2 - along**2, 0.0))
         area = float(np.clip(height + TOP_OF_GRAIN * reach + wall, 0.0, 2 * wall).sum() * 2 * reach)
@@ -133,23 +111,13 @@ def surface_angles(
 
 
 def surface_heights(positions: np.ndarray, chord: float, reach: float, view: DrumView) -> np.ndarray | None:
-    """Heights of the surface of a bed above the axis at `STATIONS` [m]; None where it cannot be seen.
+    """Return the heights of the surface above the axis at `STATIONS` [m]; None if it cannot be seen.
 
-    The surface is found as by `surface_angles`, and turned back into the picture. Beside it is the shell.
-
-    Parameters
-    ----------
-    positions, chord, reach, view
-        As of `surface_angles`.
+    The parameters are those of `surface_angles`. Outside the bed the height is that of the shell.
     """
-    if not len(positions):
+    if (levelled := _levelled(positions, reach, view)) is None:
         return None
-    center = positions.mean(axis=0)
-    turn = math.atan2(-center[0], -center[2])
-    level = _turned_back(view.seen(positions, reach), turn)
-    if not len(level):
-        return None
-    along, height = profile(level, reach)
+    turn, along, height = levelled
     inside = np.abs(along) < chord
     if not inside.any():
         return None
@@ -163,12 +131,27 @@ def surface_heights(positions: np.ndarray, chord: float, reach: float, view: Dru
 
 
 def level_of(filling: float, radius: float) -> float:
-    """Height of a level bed that takes a part of a drum, above its lowest line [m]."""
+    """Return the height of a level bed that fills a part of a drum, above its lowest line [m]."""
     if filling > 0.5:
         return 2 * radius - level_of(1 - filling, radius)
     angles = np.linspace(0.0, math.pi, 10_001)
     angle = np.interp(filling, (angles - np.sin(angles)) / (2 * math.pi), angles)
     return float(radius * (1 - np.cos(angle / 2)))
+
+
+def _levelled(
+    positions: np.ndarray, reach: float, view: DrumView | None
+) -> tuple[float, np.ndarray, np.ndarray] | None:
+    """Return the angle of a bed's centre of mass, and the profile of the bed turned back by it.
+
+    Its surface is then nearly level, so that steep parts are seen as well as flat ones.
+    """
+    if not len(positions):
+        return None
+    center = positions.mean(axis=0)
+    turn = math.atan2(-center[0], -center[2])
+    level = _turned_back(positions if view is None else view.seen(positions, reach), turn)
+    return (turn, *profile(level, reach)) if len(level) else None
 
 
 def _turned_back(positions: np.ndarray, turn: float) -> np.ndarray:

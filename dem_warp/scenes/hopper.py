@@ -1,4 +1,4 @@
-"""The flat-bottomed hopper: fill a round bin, open the hole in its floor, weigh what runs out."""
+"""The flat-bottomed hopper: fill a round bin, open the hole in its floor, weigh the discharged grains."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,20 +19,20 @@ from dem_warp.walls import Cylinder, Disc, Wall
 
 PLUG = 2
 DEPTH = 6.0
-"""Grains leave the world this many of their bounding radii below the outlet, where they fall freely."""
+"""Depth below the outlet where grains leave the world, over their bounding radius."""
 
 OVER_OUTLET = 0.25
-"""Grains nearer to the axis than this part of the outlet's diameter are above its middle."""
+"""Radius of the middle of the outlet over its diameter."""
 
 
 @dataclass(frozen=True)
 class Hopper(PouredScene):
-    """A flat-bottomed round bin is filled by a rain of grains; a round hole in its floor opens at once."""
+    """Discharge of a flat-bottomed round bin, filled by a rain of grains, through a hole in its floor."""
 
     diameter: Annotated[float, Parameter("m", above=0.0)]
     """Inner diameter of the bin."""
     fill_depth: Annotated[float, Parameter("m", above=0.0)]
-    """Height that it is filled to."""
+    """Height of the filling."""
     outlet: Annotated[float, Parameter("m", above=0.0)]
     """Diameter of the hole."""
     wall_material: Material
@@ -47,13 +47,12 @@ class Hopper(PouredScene):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.outlet >= self.diameter:
-            raise ValueError(
-                f"Hopper.outlet: must be below the diameter {self.diameter!r} [m], got {self.outlet!r}"
-            )
+            rule = f"must be below the diameter {self.diameter!r} [m]"
+            raise ValueError(f"Hopper.outlet: {rule}, got {self.outlet!r}")
 
     @property
     def brim(self) -> float:
-        """Height that it is filled to [m]."""
+        """Height of the filling [m]."""
         return self.fill_depth
 
     @property
@@ -62,15 +61,15 @@ class Hopper(PouredScene):
         return self.outlet
 
     def volume_below(self, height: float) -> float:
-        """Volume of the bin up to a height [m3]."""
+        """Return the volume of the bin up to a height [m3]."""
         return np.pi / 4 * self.diameter**2 * height
 
     def cross_section(self, reach: float) -> CrossSection:
-        """Inside the bin."""
+        """Return the inside of the bin."""
         return CrossSection.circle(self.diameter / 2)
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
-        """The bin up to above where grains are released, its floor, and the plug in it."""
+        """Return the bin up to above the release height, its floor, and the plug in it."""
         bottom, up = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         return (
             Cylinder(bottom, self.diameter / 2, self.release(reach) + 2 * reach),
@@ -79,36 +78,36 @@ class Hopper(PouredScene):
         )
 
     def room(self, reach: float) -> tuple[float, float, float]:
-        """The bin, and a little below its outlet."""
+        """Return the space of the bin and below its outlet."""
         half_width = self.diameter / 2 + 2 * reach
         return half_width, half_width, -DEPTH * reach
 
     def controller(self, case: Case[Any], setup: WorldSetup, chunk: int) -> "HopperController":
-        """Controller of one case."""
+        """Return the controller of one case."""
         return HopperController(case, setup, chunk)
 
 
 class HopperController(DischargeController):
-    """Phases of one hopper: fill, settle, open, discharge."""
+    """Controller of a hopper."""
 
     gate = PLUG
 
     @property
     def gate_path(self) -> float:
-        """To below where grains leave the world [m]."""
+        """End of the gate's path, below the lowest grains [m]."""
         return (DEPTH + 2.0) * self.reach
 
     @property
     def expected_discharge(self) -> float:
-        """After Beverloo, Leniger and van de Velde (1961), without their correction for the grains [s]."""
+        """Duration by the law of Beverloo, Leniger and van de Velde (1961), for grains of size 0 [s]."""
         hopper = self.case.scene
         return hopper.volume / (0.5 * np.sqrt(GRAVITY) * hopper.outlet**2.5)
 
     def came_out(self, view: WorldView) -> np.ndarray:
-        """Below the floor, where a grain that left the world has its last place."""
+        """Mark the grains below the floor, where a grain that left the world has its last place."""
         return view.positions[:, 2] < 0.0
 
     def over_outlet(self, view: WorldView) -> np.ndarray:
-        """Near the axis."""
+        """Mark the grains near the axis."""
         from_axis = np.hypot(view.positions[:, 0], view.positions[:, 1])
         return from_axis < OVER_OUTLET * self.case.scene.outlet

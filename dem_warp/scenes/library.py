@@ -1,4 +1,4 @@
-"""Every scene, by its name in study files; a new one is its file and a line here."""
+"""All scenes by name; a new one needs its file and a line here."""
 
 from dem_warp.registry import Registry, require_kind
 from dem_warp.scenes.draw_down import DrawDown
@@ -14,4 +14,4 @@ SCENES = Registry(
     {scene.name: scene for scene in _ALL},
     lambda name, kind, known: require_kind(PouredScene, name, kind),
 )
-"""Tests by the name of their section; those of plug-ins included."""
+"""Scenes by the name of their section in study files, including those of plugins."""

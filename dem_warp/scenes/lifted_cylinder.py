@@ -1,4 +1,4 @@
-"""The lifted-cylinder test: fill an open tube on a plate, strike it off, lift it, wait for the heap."""
+"""The lifted-cylinder test: fill an open tube on a plate, level it off, lift it, wait for the heap."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,50 +14,47 @@ from dem_warp.parameters import Parameter
 from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
-from dem_warp.scenes.scene import Course, Decision, Observable
+from dem_warp.scenes.scene import Decision, Observable, SceneState
 from dem_warp.scenes.surfaces import bed_level
 from dem_warp.view import WorldView
 from dem_warp.walls import Cylinder, Disc, Motion, Plane, Wall
 
 PLATE, TUBE = 0, 1
 GONE = 1.5
-"""Grains that have risen with the tube by this many times its height leave with it."""
+"""Rise of the tube over its height at which grains that rose with it are removed."""
 
 FALLS = {"t75": 0.75, "t55": 0.55}
-"""Parts of the fill height to which the falling surface is timed."""
+"""Parts of the fill height at which the falling surface is timed."""
 
 ROLLED = 2.0
-"""Grains that end farther from the axis than this many radii of the tube have rolled off the heap."""
+"""Distance from the axis, over the tube's radius, beyond which grains have rolled off the heap."""
 
 CLOGGED = 0.02
-"""Part of the grains from which on a tube that takes them along is clogged: no heap."""
-
+"""Part of the grains rising with the tube above which it is clogged."""
 
 NOTHING_LEFT = "no grain is left on the plate, so there is no heap: lower the tilt, or widen the plate"
 
 LIFT_OBSERVABLES = {
-    "time_to_rest": Observable("s", "from the start of the lift until the heap rests"),
+    "time_to_rest": Observable("s", "time from the start of the lift until the heap rests"),
     "grains_lost": Observable("1", "grains that left the plate, or rose with the tube"),
     "wall_drag": Observable(
         "1",
-        "part of the grains' weight that hangs on the tube while it is drawn, the mean over every step from "
-        "the start of the lift until t75, or the tube is clear: what a balance that it hangs on shows beyond "
-        "its own weight",
+        "vertical force of the grains on the tube over their weight, mean over every step from the start of "
+        "the lift until t75, or until the tube is clear; a balance that holds the tube shows it",
     ),
     "centre_height": Observable(
-        "m", "height of the heap's centre of mass above the plate; absent where every grain was lost"
+        "m", "height of the heap's centre of mass above the plate; absent if every grain was lost"
     ),
     "rolled_fraction": Observable(
         "1",
-        f"part of the mass in the tube that ends farther from its axis than {ROLLED:g} of its inner radii, "
-        "or is lost",
+        f"part of the mass in the tube that is lost or ends farther from its axis than {ROLLED:g} times its "
+        "inner radius",
     ),
 } | {
     name: Observable(
         "s",
-        f"from the start of the lift until the surface has fallen to {100 * part:g} % of fill_height; it is "
-        "measured as that is, from the grains within the tube's cross-section; straight between two looks, "
-        "absent where it does not fall so far",
+        f"time from the start of the lift until the surface within the tube's cross-section has fallen to "
+        f"{100 * part:g} % of fill_height, interpolated between looks; absent if it does not fall so far",
     )
     for name, part in FALLS.items()
 }
@@ -67,7 +64,7 @@ LIFT_OBSERVABLES = {
 class LiftedCylinder(PouredScene):
     """An open tube is filled by a rain of grains and lifted at constant speed along its axis.
 
-    Plate and tube are tilted together, if they are: z is the axis of the tube, and gravity is turned about y.
+    A tilt turns plate and tube together: z is the axis of the tube, and gravity is turned about y.
     """
 
     diameter: Annotated[float, Parameter("m", above=0.0)]
@@ -79,22 +76,21 @@ class LiftedCylinder(PouredScene):
     lift_speed: Annotated[float, Parameter("m/s", above=0.0)] = 0.05
     """Speed of the tube."""
     duration: Annotated[float | None, Parameter("s", above=0.0)] = None
-    """Simulated time at which the test ends; left out: at rest."""
+    """Simulated time at which the test ends. Default: at rest."""
     plate_diameter: Annotated[float | None, Parameter("m", above=0.0)] = None
-    """Diameter of a round plate, over whose rim grains fall and are lost; left out: the plate has no end."""
+    """Diameter of a round plate; grains that fall over its rim are lost. Default: infinite."""
     tilt: Annotated[float, Parameter("rad", at_least=0.0, below=math.pi / 2)] = 0.0
-    """Tilt of plate and tube together, from the beginning on: the plate falls towards +x."""
+    """Tilt of plate and tube together from the beginning, downwards to +x."""
     plate_friction: Annotated[float | None, Parameter("1", at_least=0.0)] = None
-    """Static friction on a plate of known roughness; left out: the plate is as the tube."""
+    """Static friction on the plate. Default: that of the tube."""
     plate_friction_excess: Annotated[float, Parameter("1", at_least=0.0)] = 0.0
-    """Static friction that the plate has beyond the tube's; nothing on a plate of known friction."""
+    """Static friction on the plate beyond the tube's; not used with plate_friction."""
     vibration_amplitude: Annotated[float, Parameter("m", at_least=0.0)] = 0.0
-    """Amplitude of the plate along the axis of the tube, while the drive of the tube runs."""
+    """Amplitude of the plate's vibration along the axis of the tube, while the tube's drive runs."""
     vibration_frequency: Annotated[float, Parameter("Hz", above=0.0)] = 50.0
-    """Frequency of the plate."""
+    """Frequency of the plate's vibration."""
     vibration_hold: Annotated[float, Parameter("s", at_least=0.0)] = 0.5
-    """The drive runs from the start of the lift until this long after the tube has risen by its height, and
-    on to the end of a vibration."""
+    """Time that the drive runs on after the tube has risen by its height, rounded up to a whole vibration."""
 
     name = "lifted-cylinder"
     wall_names = ("plate", "tube")
@@ -108,24 +104,22 @@ class LiftedCylinder(PouredScene):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.plate_diameter is not None and not self.diameter < self.plate_diameter:
-            raise ValueError(
-                f"LiftedCylinder.plate_diameter: must be above the tube's {self.diameter!r} [m], "
-                f"got {self.plate_diameter!r}"
-            )
+            rule = f"must be above the tube's {self.diameter!r} [m]"
+            raise ValueError(f"LiftedCylinder.plate_diameter: {rule}, got {self.plate_diameter!r}")
 
     @property
     def gravity(self) -> tuple[float, float, float]:
-        """In the frame of plate and tube [m/s2]."""
+        """Gravity in the frame of plate and tube [m/s2]."""
         return GRAVITY * math.sin(self.tilt), 0.0, -GRAVITY * math.cos(self.tilt)
 
     @property
     def lift_time(self) -> float:
-        """In which the tube rises by its height [s]."""
+        """Time in which the tube rises by its height [s]."""
         return self.height / self.lift_speed
 
     @property
     def vibration_time(self) -> float:
-        """From the start of the lift until the plate, after whole vibrations, is where it was [s]."""
+        """Time from the start of the lift to the end of the plate's last whole vibration [s]."""
         if self.vibration_amplitude == 0:
             return 0.0
         vibrations = (self.lift_time + self.vibration_hold) * self.vibration_frequency
@@ -133,7 +127,7 @@ class LiftedCylinder(PouredScene):
 
     @property
     def lift(self) -> dict[int, Motion]:
-        """Motions of the walls that begin with the lift."""
+        """Motions of the walls during the lift."""
         motions = {TUBE: Motion(velocity=(0.0, 0.0, self.lift_speed))}
         if self.vibration_amplitude > 0:
             motions[PLATE] = Motion(
@@ -145,7 +139,7 @@ class LiftedCylinder(PouredScene):
 
     @property
     def plate(self) -> Plane | Disc:
-        """Plate that the tube stands on, at z = 0."""
+        """Plate below the tube, at z = 0."""
         if self.plate_diameter is None:
             return Plane()
         return Disc((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), self.plate_diameter / 2)
@@ -156,19 +150,19 @@ class LiftedCylinder(PouredScene):
         return self.height
 
     def volume_below(self, height: float) -> float:
-        """Volume of the tube up to a height [m3]."""
+        """Return the volume of the tube up to a height [m3]."""
         return np.pi / 4 * self.diameter**2 * height
 
     def cross_section(self, reach: float) -> CrossSection:
-        """Inside the tube."""
+        """Return the inside of the tube."""
         return CrossSection.circle(self.diameter / 2)
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
-        """The plate and the tube."""
+        """Return the plate and the tube."""
         return self.plate, Cylinder((0.0, 0.0, 0.0), self.diameter / 2, self.height)
 
     def contacts(self, case: Case[Any]) -> tuple[ContactCoefficients, ...]:
-        """Contacts of grains with grains, with the tube and with the plate."""
+        """Return the contacts of grains with grains, with the tube and with the plate."""
         grains, tube = super().contacts(case)
         friction = self.plate_friction
         if friction is None:
@@ -176,63 +170,60 @@ class LiftedCylinder(PouredScene):
         return grains, tube, replace(tube, static_friction=friction)
 
     def contact_of(self, wall: int) -> int:
-        """Which of the contacts holds for a wall, by its number."""
+        """Return the index of the contact of a wall."""
         return 2 if wall == PLATE else 1
 
     def check_parts(self, names: Sequence[str]) -> None:
-        """Check names of parts of the walls, and that the plate has one friction."""
+        """Raise ValueError for an unknown part, or a plate with two frictions."""
         super().check_parts(names)
         if "plate" in names and (self.plate_friction is not None or self.plate_friction_excess):
-            value = (
-                f"plate_friction {self.plate_friction}, plate_friction_excess {self.plate_friction_excess}"
-            )
-            raise ValueError(
-                f"LiftedCylinder: a plate of its own material has its friction there, got {value}"
-            )
+            name = "plate_friction_excess" if self.plate_friction is None else "plate_friction"
+            rule = "must be left out if the plate has its own material"
+            raise ValueError(f"LiftedCylinder.{name}: {rule}, got {getattr(self, name)!r}")
 
     def room(self, reach: float) -> tuple[float, float, float]:
-        """Wide enough for the flattest heap."""
+        """Return a space wide enough for the flattest heap."""
         half_width = 4.0 * self.diameter + 2.0 * self.height
         return half_width, half_width, -2 * reach
 
     def controller(self, case: Case[Any], setup: WorldSetup, chunk: int) -> "LiftController":
-        """Controller of one case."""
+        """Return the controller of one case."""
         return LiftController(case, setup, chunk)
 
 
 @dataclass
-class Lift(Course):
-    """Course of a lifted cylinder."""
+class LiftState(SceneState):
+    """State of a lifted cylinder."""
 
     mass: float = 0.0
-    """Of the grains that filled the tube [kg]."""
+    """Mass of the grains that filled the tube [kg]."""
     surface: list[float] = field(default_factory=list)
-    """Time since the start of the lift [s], and level of the surface [m], when last looked at."""
-    pushed: float = 0.0
-    """Impulse of the grains on the tube, along its axis, when the lift began [N s]."""
-    drawn: list[float] = field(default_factory=list)
-    """Time since the start of the lift [s], and that impulse, when last looked at."""
+    """Time since the start of the lift [s] and level of the surface [m] at the last look."""
+    first_impulse: float = 0.0
+    """Impulse of the grains on the tube, along its axis, at the start of the lift [N s]."""
+    last_impulse: list[float] = field(default_factory=list)
+    """Time since the start of the lift [s] and that impulse at the last look."""
 
 
-class LiftController(PouredController[Lift]):
-    """Phases of one lifted cylinder: fill, settle, lift."""
+class LiftController(PouredController[LiftState]):
+    """Controller of a lifted cylinder: fill, settle, lift."""
 
     LIFT_MARGIN = 6.0
-    """Time [s] allowed beyond the tube's own height."""
+    """Longest time after the tube has risen by its height [s]."""
 
     def __init__(self, case: Case[LiftedCylinder], setup: WorldSetup, chunk: int) -> None:
-        super().__init__(case, setup, chunk, Lift("fill"))
+        super().__init__(case, setup, chunk, LiftState("fill"))
         self.scene = case.scene
         lift = max(0.5 * self.scene.diameter / self.scene.lift_speed, self.scene.vibration_time)
         self.phases["lift"] = Phase(self._lift, lift + 0.3)
 
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
-        """Lift the tube, and let the drive shake the plate."""
-        self.course.mass = float(view.masses[kept].astype(float).sum())
-        self.course.surface = [0.0, self.course.observables["fill_height"]]
-        self.course.pushed = view.impulse
-        self.course.drawn = [0.0, self.course.pushed]
-        self.course.enter("lift", view)
+        """Lift the tube and vibrate the plate."""
+        self.state.mass = float(view.masses[kept].astype(float).sum())
+        self.state.surface = [0.0, self.state.observables["fill_height"]]
+        self.state.first_impulse = view.impulse
+        self.state.last_impulse = [0.0, view.impulse]
+        self.state.enter("lift", view)
         return self.scene.lift
 
     def _lift(self, view: WorldView) -> Decision:
@@ -240,13 +231,13 @@ class LiftController(PouredController[Lift]):
         return replace(decision, move={PLATE: Motion()}) if self._vibration_ends(view) else decision
 
     def _vibration_ends(self, view: WorldView) -> bool:
-        """Tell that the plate, which vibrated when the world was last looked at, has come to a stop."""
+        """Return True if the vibration of the plate has ended since the last look."""
         before = (view.step - self.period) * self.setup.time_step
-        end = self.course.phase_start + self.scene.vibration_time
-        return self.course.phase_start <= before < end <= view.time
+        end = self.state.phase_start + self.scene.vibration_time
+        return self.state.phase_start <= before < end <= view.time
 
     def _lifted(self, view: WorldView) -> Decision:
-        elapsed = view.time - self.course.phase_start
+        elapsed = view.time - self.state.phase_start
         rise = self.scene.lift_speed * elapsed
         top = view.highest + self.reach
         self._time_fall(view, elapsed)
@@ -261,55 +252,57 @@ class LiftController(PouredController[Lift]):
         if rise > GONE * self.scene.height and view.highest > rise:
             riding = view.alive & (view.positions[:, 2] > rise)
             count = np.count_nonzero(riding)
-            if count > CLOGGED * self.course.observables["grain_count"]:
+            if count > CLOGGED * self.state.observables["grain_count"]:
                 return Decision(done=True, failure=f"the tube is clogged: {count} grains rose with it")
             return Decision(remove=np.flatnonzero(riding))
         if elapsed > max(self.scene.lift_time, self.scene.vibration_time) + self.LIFT_MARGIN:
-            failure = f"the heap did not come to rest within {elapsed:.1f} s of the lift; {UNREST}"
+            failure = f"the heap did not come to rest within {elapsed:.1f} s after the lift began; {UNREST}"
             return Decision(done=True, failure=failure)
         return Decision()
 
     def _time_fall(self, view: WorldView, elapsed: float) -> None:
-        """Note when the surface has fallen to parts of the height it had."""
-        seen = self.course.observables
+        """Record the times at which the surface has fallen to FALLS of its first height."""
+        seen = self.state.observables
         awaited = {name: part * seen["fill_height"] for name, part in FALLS.items() if name not in seen}
         if not awaited:
             return
-        radius, (before, above) = self.scene.diameter / 2, self.course.surface
+        radius, (before, above) = self.scene.diameter / 2, self.state.surface
         inside = view.alive & (np.hypot(view.positions[:, 0], view.positions[:, 1]) < radius)
         level = bed_level(view.positions[inside], (radius, radius), self.grain_reach)
         for name, awaited_level in awaited.items():
             if level <= awaited_level:
                 seen[name] = before + (above - awaited_level) / (above - level) * (elapsed - before)
-        self.course.surface = [elapsed, level]
+        self.state.surface = [elapsed, level]
 
     def _weigh_tube(self, view: WorldView, elapsed: float, ends: bool) -> None:
-        """Note the mean load of the tube until t75, or until there is no more to come."""
-        seen, (before, carried) = self.course.observables, self.course.drawn
+        """Record the mean load of the tube until t75, or until it is clear."""
+        seen, (before, carried) = self.state.observables, self.state.last_impulse
         if "wall_drag" in seen:
             return
         if ends or "t75" in seen:
             end = seen.get("t75", elapsed)
-            mean = (np.interp(end, [before, elapsed], [carried, view.impulse]) - self.course.pushed) / end
-            seen["wall_drag"] = float(mean / (self.course.mass * self.scene.gravity[2]))
-        self.course.drawn = [elapsed, view.impulse]
+            mean = (
+                np.interp(end, [before, elapsed], [carried, view.impulse]) - self.state.first_impulse
+            ) / end
+            seen["wall_drag"] = float(mean / (self.state.mass * self.scene.gravity[2]))
+        self.state.last_impulse = [elapsed, view.impulse]
 
     def _finish(self, view: WorldView, elapsed: float) -> None:
-        course = self.course
-        rested = elapsed if course.slow_since is None else course.slow_since - course.phase_start
-        course.observables |= {
+        state = self.state
+        rested = elapsed if state.slow_since is None else state.slow_since - state.phase_start
+        state.observables |= {
             "time_to_rest": float(rested),
             "simulated_time": view.time,
-            "grains_lost": course.observables["grain_count"] - float(np.count_nonzero(view.alive)),
+            "grains_lost": state.observables["grain_count"] - float(np.count_nonzero(view.alive)),
         }
         self._weigh_tube(view, elapsed, True)
         self._weigh_heap(view)
-        course.enter("rest", view)
+        state.enter("rest", view)
 
     def _weigh_heap(self, view: WorldView) -> None:
-        """Measure where the mass came to lie."""
+        """Measure the distribution of the heap's mass."""
         masses, positions = view.masses[view.alive].astype(float), view.positions[view.alive]
         near = np.hypot(positions[:, 0], positions[:, 1]) <= ROLLED * self.scene.diameter / 2
-        self.course.observables["rolled_fraction"] = 1.0 - float(masses[near].sum()) / self.course.mass
+        self.state.observables["rolled_fraction"] = 1.0 - float(masses[near].sum()) / self.state.mass
         if len(masses):
-            self.course.observables["centre_height"] = float(masses @ positions[:, 2] / masses.sum())
+            self.state.observables["centre_height"] = float(masses @ positions[:, 2] / masses.sum())

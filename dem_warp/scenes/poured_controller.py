@@ -1,4 +1,4 @@
-"""Controllers of scenes that begin with a rain: the filling, the rest, and what the fill measures."""
+"""Controllers of scenes that begin with a rain: filling, settling, and the measures of the fill."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -9,45 +9,42 @@ import numpy as np
 from dem_warp.case import Case
 from dem_warp.model import WorldSetup
 from dem_warp.scenes.poured_scene import PouredScene
-from dem_warp.scenes.scene import CourseT, Decision
+from dem_warp.scenes.scene import Decision, StateT
 from dem_warp.scenes.surfaces import bed_level
 from dem_warp.view import WorldView
 from dem_warp.walls import Motion
 
 HEAPED = 4
-"""Slow grains above the brim that show the container to be full."""
+"""Number of slow grains above the brim at which the container is full."""
 
 CALM = 10.0
-"""Grains rest when their root mean square speed is below `rest_speed` and none passes CALM times that."""
+"""Largest speed of a resting grain over `rest_speed`, which limits the root mean square speed."""
 
 UNREST = (
-    "grains that tremble in place without end want a lower time_step_fraction, and grains that lose no "
-    "energy (restitution 1, friction 0) never rest"
+    "if grains tremble in place, lower time_step_fraction; grains that lose no energy (restitution 1, "
+    "friction 0) never rest"
 )
-"""Advice where grains did not come to rest: damping over too long a step feeds a motion."""
+"""Advice for grains that do not rest: with too long a step, damping adds energy."""
 
 
 class Phase(NamedTuple):
-    """A part of a scene's course."""
+    """Phase of a scene."""
 
     look: Callable[[WorldView], Decision]
     expected: float
-    """Duration, roughly [s]."""
+    """Approximate duration [s]."""
 
 
-class PouredController(ABC, Generic[CourseT]):
-    """Fills the container and lets the grains settle; the phases after that are the scene's own.
-
-    It looks at its world every `period` steps, which follows from the world's time step alone.
-    """
+class PouredController(ABC, Generic[StateT]):
+    """Controller that fills the container and lets the grains settle; the later phases are the scene's."""
 
     LOOK = 4.0e-3
-    """Time between two looks [s]; rounded up to a power of two of chunks."""
+    """Time between two looks [s], rounded up to a power of two times the chunk."""
 
     FILL_MARGIN, SETTLE_LIMIT = 2.0, 3.0
-    """Time [s] allowed beyond the rain, and for the settling."""
+    """Longest time of filling after the rain, and of settling [s]."""
 
-    def __init__(self, case: Case[Any], setup: WorldSetup, chunk: int, course: CourseT) -> None:
+    def __init__(self, case: Case[Any], setup: WorldSetup, chunk: int, state: StateT) -> None:
         self.case, self.setup = case, setup
         self.poured: PouredScene = case.scene
         self.reach = float(setup.bounding_radii.max())
@@ -58,32 +55,32 @@ class PouredController(ABC, Generic[CourseT]):
             "fill": Phase(self._fill, self.rain_end + 0.1),
             "settle": Phase(self._settle, 0.2),
         }
-        self.course = course
+        self.state = state
 
     @abstractmethod
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
-        """Enter the scene's own first phase, the grains `kept` being at rest; which walls move then."""
+        """Enter the scene's first own phase with the resting grains `kept`; return the walls' motions."""
 
     def fraction(self, time: float) -> float:
-        """Roughly how much of the case is done at a simulated time [s], 0 to 1."""
+        """Return roughly the fraction done at a simulated time [s], 0 to 1."""
         expected = {name: phase.expected for name, phase in self.phases.items()}
-        done = sum(expected.get(phase["name"], 0.0) for phase in self.course.phases)
-        length = expected[self.course.phase]
-        return (done + min(time - self.course.phase_start, length)) / sum(expected.values())
+        done = sum(expected.get(phase["name"], 0.0) for phase in self.state.phases)
+        length = expected[self.state.phase]
+        return (done + min(time - self.state.phase_start, length)) / sum(expected.values())
 
     def look(self, view: WorldView) -> Decision:
-        """Decide what happens next from the present state."""
-        return self.phases[self.course.phase].look(view)
+        """Decide what happens next."""
+        return self.phases[self.state.phase].look(view)
 
     def rests(self, view: WorldView) -> bool:
-        """Tell that the grains have been slow for `rest_time`."""
+        """Return True if the grains have been slow for `rest_time`."""
         limit = self.poured.rest_speed
         if not (view.rms_speed < limit and view.fastest < CALM * limit):
-            self.course.slow_since = None
+            self.state.slow_since = None
             return False
-        if self.course.slow_since is None:
-            self.course.slow_since = view.time
-        return view.time - self.course.slow_since >= self.poured.rest_time
+        if self.state.slow_since is None:
+            self.state.slow_since = view.time
+        return view.time - self.state.slow_since >= self.poured.rest_time
 
     def _fill(self, view: WorldView) -> Decision:
         if view.time > self.rain_end + self.FILL_MARGIN:
@@ -92,22 +89,22 @@ class PouredController(ABC, Generic[CourseT]):
         awaited = view.alive & ~view.released
         if not (self.is_full(view) or (not awaited.any() and self.rests(view))):
             return Decision()
-        self.course.enter("settle", view)
+        self.state.enter("settle", view)
         if self.poured.grain_count is not None:
             return Decision()
         return Decision(remove=np.flatnonzero(self.surplus(view) | awaited))
 
     def surplus(self, view: WorldView) -> np.ndarray:
-        """Grains that are struck off a container filled to the brim, (n,) bool."""
+        """Mark the grains to remove from a container filled to the brim, (n,) bool."""
         return view.alive & (view.positions[:, 2] > self.poured.brim)
 
     def level(self, view: WorldView, kept: np.ndarray) -> float:
-        """Height of the surface of the bed that the grains kept make [m]."""
+        """Return the height of the surface of the bed of grains `kept` [m]."""
         half_sides = self.poured.cross_section(self.reach).half_sides
         return bed_level(view.positions[kept], half_sides, self.grain_reach)
 
     def is_full(self, view: WorldView) -> bool:
-        """Tell that slow grains are heaped above the brim; a counted fill is never full."""
+        """Return True if slow grains lie above the brim; a counted fill is never full."""
         if self.poured.grain_count is not None or view.highest <= self.poured.brim:
             return False
         above = view.alive & view.released & (view.positions[:, 2] > self.poured.brim)
@@ -115,7 +112,7 @@ class PouredController(ABC, Generic[CourseT]):
         return bool(np.count_nonzero(slow) >= HEAPED)
 
     def _settle(self, view: WorldView) -> Decision:
-        if view.time - self.course.phase_start > self.SETTLE_LIMIT:
+        if view.time - self.state.phase_start > self.SETTLE_LIMIT:
             failure = f"the grains poured did not come to rest within {self.SETTLE_LIMIT:g} s; {UNREST}"
             return Decision(done=True, failure=failure)
         if not self.rests(view):
@@ -130,7 +127,7 @@ class PouredController(ABC, Generic[CourseT]):
     def _measure_fill(self, view: WorldView, kept: np.ndarray) -> None:
         scene, level = self.poured, self.level(view, kept)
         volumes = self.setup.masses / self.setup.grains.densities
-        self.course.observables |= {
+        self.state.observables |= {
             "grain_count": float(np.count_nonzero(kept)),
             "fill_height": level - scene.floor,
             "solid_fraction": float(volumes[kept[: len(volumes)]].sum()) / scene.volume_below(level),

@@ -1,4 +1,4 @@
-"""Base of scenes that begin with a rain into a container: its settings and the world before it."""
+"""Base of scenes that begin with a rain into a container: its settings and the initial world."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -11,57 +11,62 @@ from dem_warp.case import Case
 from dem_warp.entries import max_partners
 from dem_warp.materials import WallPart
 from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
-from dem_warp.parameters import Parameter, check_parameters
+from dem_warp.parameters import Parameter, check_parameters, require_choice
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 from dem_warp.scenes.scene import Controller, Observable
 from dem_warp.walls import Wall
 
 FREEBOARD = 1.2
-"""Grains fall this many times the way from the brim to the lowest wall, at the most."""
+"""Largest fall of a grain over the height from the brim to the lowest wall."""
 
 FILL_OBSERVABLES = {
-    "grain_count": Observable("1", "grains in the container when it has been filled and struck off"),
+    "grain_count": Observable("1", "grains in the container after it was filled and levelled off"),
     "fill_height": Observable("m", "mean height of the bed's surface above the container's floor"),
     "solid_fraction": Observable("1", "volume of the grains over that of the container up to the surface"),
-    "simulated_time": Observable("s", "from the first grain of the rain to the end"),
+    "simulated_time": Observable("s", "time from the first grain of the rain to the end"),
 }
 """Observables of every poured scene."""
 
 
+class TooManyGrainsError(ValueError):
+    """A scene needs more grains than a world can have."""
+
+    def __init__(self, scene: str, rule: str, count: float) -> None:
+        super().__init__(f"{scene}.grain_count: {rule}, got {count:.4g}")
+        self.rule, self.count = rule, count
+
+
 @dataclass(frozen=True, kw_only=True)
 class PouredScene(ABC):
-    """A container that a rain of grains fills; every kind has a `wall_material` beside."""
+    """A container filled by a rain of grains; every subclass also has a `wall_material`."""
 
     rain_rate: Annotated[float, Parameter("1/s", above=0.0)] = 3000.0
     """Grains per second while filling."""
     rain_speed: Annotated[float, Parameter("m/s", above=0.0)] = 0.5
     """Speed of the raining grains."""
     grain_count: Annotated[int | None, Parameter("1", at_least=1)] = None
-    """Grains to pour; left out: until four lie above the brim, and what stands above it is removed."""
+    """Number of grains to pour. Default: until four lie above the brim; all above it are then removed."""
     rest_speed: Annotated[float, Parameter("m/s", above=0.0)] = 1.0e-3
-    """The grains rest when their root mean square speed is below this, and none passes ten times it ..."""
+    """Largest root mean square speed of resting grains; the fastest may have ten times this speed."""
     rest_time: Annotated[float, Parameter("s", above=0.0)] = 0.05
-    """... for this long."""
+    """Time that the grains must stay below `rest_speed` to be at rest."""
     air_drag: Annotated[float, Parameter("1/s", at_least=0.0)] = 0.0
-    """Part of its velocity that still air takes from a free grain in a second, whatever its size."""
+    """Rate at which still air slows a free grain of any size."""
 
     name: ClassVar[str]
     """Name in study files."""
     leaves_a_heap: ClassVar[bool] = False
-    """The test ends in a heap, whose repose angle can be measured."""
+    """True if the test ends in a heap with a repose angle."""
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES
     densest_fill: ClassVar[float] = 0.64
-    """Solid fraction that no poured bed is expected to pass: how many grains are kept ready."""
+    """Largest expected solid fraction of the poured bed, for the number of grains."""
     part_names: ClassVar[tuple[tuple[str, ...], ...]] = ()
-    """Names that each wall answers to where it may be of another material than the rest, from the general to
-    the special; empty: all walls are alike."""
+    """Part names of each wall that may have its own material, from general to special; empty: no parts."""
     weighed: ClassVar[int | None] = None
     """Number of the wall whose impulse is summed up."""
 
     def __post_init__(self) -> None:
         check_parameters(self)
-
-    # ---- what a scene says of its container ----------------------------------------------------------------
 
     @property
     @abstractmethod
@@ -71,57 +76,49 @@ class PouredScene(ABC):
     @property
     @abstractmethod
     def brim(self) -> float:
-        """Height that it is filled to [m]."""
+        """Height of the filling [m]."""
 
     @abstractmethod
     def volume_below(self, height: float) -> float:
-        """Volume of the container up to a height [m3]."""
+        """Return the volume of the container up to a height [m3]."""
 
     @abstractmethod
     def cross_section(self, reach: float) -> CrossSection:
-        """Opening that grains of a bounding radius [m] may rain through."""
+        """Return the opening for a rain of grains of a bounding radius [m]."""
 
     @abstractmethod
     def walls(self, reach: float) -> tuple[Wall, ...]:
-        """Its walls, and whatever else the test needs, for grains of a bounding radius [m]."""
+        """Return all walls, for grains of a bounding radius [m]."""
 
     @abstractmethod
     def room(self, reach: float) -> tuple[float, float, float]:
-        """Half sides along x and y, and lowest height, of the space that grains may be in [m]."""
+        """Return half sides along x and y, and lowest height, of the space for grains [m]."""
 
     @abstractmethod
     def controller(self, case: Any, setup: WorldSetup, chunk: int) -> Controller[Any]:
-        """Controller of one case."""
+        """Return the controller of one case."""
 
     @property
     def gravity(self) -> tuple[float, float, float]:
-        """[m/s2]"""
+        """Gravity [m/s2]."""
         return 0.0, 0.0, -GRAVITY
 
     def contacts(self, case: Case[Any]) -> tuple[ContactCoefficients, ...]:
-        """Contacts of grains with grains, and with each kind of wall."""
+        """Return the contacts of grains with grains, and with each kind of wall."""
         return case.contacts(case.scene.wall_material)
 
     def contact_of(self, wall: int) -> int:
-        """Which of the contacts holds for a wall, by its number."""
+        """Return the index of the contact of a wall."""
         return 1
 
     def check_parts(self, names: Sequence[str]) -> None:
-        """Check names of parts of the walls.
-
-        Raises
-        ------
-        ValueError
-            When the scene has no such part.
-        """
-        known = list(dict.fromkeys(name for wall in self.part_names for name in wall))
+        """Raise ValueError for a name that is no part of the walls."""
+        known = tuple(dict.fromkeys(name for wall in self.part_names for name in wall))
         for name in names:
-            if name not in known:
-                rule = f"the walls have the parts {', '.join(known) or 'none'}"
-                raise ValueError(f"{type(self).__name__}: {rule}, got {name!r}")
+            require_choice(f"{type(self).__name__}: part of the walls", name, known)
 
     def surfaces(self, case: Case[Any], wall_count: int) -> tuple[tuple[ContactCoefficients, ...], list[int]]:
-        """Contacts of a case, and which of them holds for each wall, those of another material included."""
+        """Return the contacts of a case, with those of wall parts, and the contact index of each wall."""
         contacts = self.contacts(case)
         place = {part: len(contacts) + number for number, part in enumerate(case.wall_parts)}
         parts = [self.part_of(case, wall) for wall in range(wall_count)]
@@ -129,13 +126,13 @@ class PouredScene(ABC):
         return (*contacts, *map(case.contact_with, case.wall_parts)), holds
 
     def part_of(self, case: Case[Any], wall: int) -> WallPart | None:
-        """Part of another material that a wall belongs to, by its most special name; None of the rest."""
+        """Return the part with its own material that a wall belongs to, by its most special name, or None."""
         parts = {part.name: part for part in case.wall_parts}
         names = self.part_names[wall] if parts and self.part_names else ()
         return next((parts[name] for name in reversed(names) if name in parts), None)
 
     def release(self, reach: float) -> float:
-        """Height from which grains fall freely [m]."""
+        """Return the height from which grains fall freely [m]."""
         return self.brim + reach
 
     @property
@@ -145,41 +142,31 @@ class PouredScene(ABC):
 
     @property
     def fall_height(self) -> float:
-        """From the brim to the lowest wall [m]."""
+        """Height from the brim to the lowest wall [m]."""
         return self.brim
 
     @property
     def top_speed(self) -> float:
-        """Speed of the fastest grain that an ordinary course of events brings [m/s]."""
+        """Largest ordinary speed of a grain [m/s]."""
         return float(np.sqrt(self.rain_speed**2 + 2 * GRAVITY * FREEBOARD * self.fall_height))
 
     @property
     def opening(self) -> float:
-        """Width of what grains run out through [m]; infinite where it is the whole container."""
+        """Width of the outlet [m]; infinite for the whole container."""
         return np.inf
 
-    # ---- the world before the first step -------------------------------------------------------------------
-
     def supply(self, case: Case[Any]) -> int:
-        """Grains kept ready.
-
-        Raises
-        ------
-        ValueError
-            If they are more than a world can have.
-        """
+        """Return the number of grains of the rain; raise TooManyGrainsError above the limit."""
         mean_volume = case.grains.mean(lambda shape: shape.volume)
         count = self.grain_count or np.ceil(self.densest_fill * self.volume / mean_volume)
         most = max_partners(case.grains.sphere_count) // case.grains.sphere_count
         if not count <= most:
-            raise ValueError(
-                f"{type(self).__name__}: must hold at most {most:,} grains of {case.grains.sphere_count} "
-                f"spheres, got {count:.4g}: lower grain_count, or make the container smaller"
-            )
+            rule = f"must be at most {most:,} grains of {case.grains.sphere_count} spheres"
+            raise TooManyGrainsError(type(self).__name__, rule, float(count))
         return int(count)
 
     def prepare(self, cases: Sequence[Case[Any]], device: Any) -> list[WorldSetup]:
-        """Worlds of cases that share this kind of scene; sizes, grains and counts may differ."""
+        """Return the initial worlds of cases of this kind of scene; sizes, grains and counts may differ."""
         scenes = [case.scene for case in cases]
         drawn = [case.grains.draw(case.scene.supply(case), case.seed) for case in cases]
         rains = place_rain(
@@ -223,7 +210,7 @@ def _world(case: Case[Any], rain: Rain) -> WorldSetup:
 
 
 def _falling(case: Case[Any], rain: Rain, release: float, reach: float) -> Grains:
-    """Grains of a rain that comes down to the release plane at one speed [m]."""
+    """Return the grains of a rain that falls to the release plane [m] at one speed."""
     count, speed = rain.grains.count, case.scene.rain_speed
     positions = rain.positions + np.array([0.0, 0.0, release + reach])
     return Grains(
@@ -239,7 +226,7 @@ def _falling(case: Case[Any], rain: Rain, release: float, reach: float) -> Grain
 
 
 def default_skin(case: Case[Any]) -> float:
-    """Skin that keeps both the lists short and the rebuilds rare [m]; longer steps want a larger one.
+    """Return a skin that keeps the lists short and the rebuilds rare [m]; it grows with the time step.
 
     Two grains may each use up half of it within the shortest cycle, two steps. So it holds four steps of the
     fastest grain, and an eighth more, up to three radii.

@@ -1,9 +1,8 @@
 """Grains that rain into a container: places without overlap, found one grain after another on the device.
 
-The rain is laid out in the frame that falls with it, grain i at height i times speed over rate, and each
-grain is tried at random places of the container's cross-section until it overlaps no grain before it. In the
-laboratory the whole rain comes down at one speed; a grain is released to gravity when it crosses the release
-plane, so grains never overlap before that.
+In the frame that falls with the rain, grain i is at height i times speed over rate, at the first random place
+of the container's cross-section where it overlaps no earlier grain. In the world the whole rain falls at one
+speed; a grain is released to gravity when it crosses the release plane, so grains never overlap before.
 """
 
 from collections.abc import Sequence
@@ -18,16 +17,16 @@ from dem_warp.population import DrawnGrains
 
 @dataclass(frozen=True)
 class CrossSection:
-    """Opening that a rain falls through, about the z axis."""
+    """Opening for a rain, centred on the z axis."""
 
     half_sides: tuple[float, float]
-    """Along x and y [m]."""
+    """Half sides along x and y [m]."""
     is_round: bool = False
-    """A circle, with `half_sides` both its radius; otherwise a rectangle."""
+    """True for a circle, whose radius is both `half_sides`; False for a rectangle."""
 
     @classmethod
     def circle(cls, radius: float) -> "CrossSection":
-        """Cross-section of a tube [m]."""
+        """Return the cross-section of a tube of a radius [m]."""
         return cls((radius, radius), True)
 
 
@@ -36,9 +35,9 @@ class Rain:
     """A rain in its own frame."""
 
     grains: DrawnGrains
-    """In order of arrival."""
+    """Grains in order of arrival."""
     positions: np.ndarray
-    """[m], shape (n, 3), the lowest grain near z = 0."""
+    """Positions [m], shape (n, 3), the lowest grain near z = 0."""
     orientations: np.ndarray
     """Quaternions x y z w, shape (n, 4)."""
 
@@ -50,24 +49,21 @@ def place_rain(
     spacings: Sequence[float],
     device: Any,
 ) -> list[Rain]:
-    """Rains of several worlds, none depending on another.
+    """Return the rains of several independent worlds.
 
     Parameters
     ----------
-    grains : sequence of DrawnGrains
-        Of each world, in order of arrival.
-    seeds : sequence of int
-    sections : sequence of CrossSection
-        Of each world's container.
+    grains, seeds, sections
+        Grains in order of arrival, seed and container of each world.
     spacings : sequence of float
-        Mean height between two grains, speed over rate [m].
+        Mean height between two grains of each world: speed over rate [m].
 
     Raises
     ------
     ValueError
         If a container is too narrow, or its rain too dense, for the grains.
     """
-    # a scene's parameters are read without a device
+    # reading a scene's parameters does not load Warp's kernels
     import warp as wp
 
     from dem_warp.kernels.lanes import WARP
@@ -93,7 +89,7 @@ def place_rain(
             wp.array(spheres.reshape(-1, 4), dtype=wp.vec4),
             wp.array([clump.sphere_count for clump in table], dtype=int),
             wp.array(reaches, dtype=float),
-            wp.array([_row(section) for section in sections], dtype=wp.vec3),
+            wp.array([(*s.half_sides, s.half_sides[0] * s.is_round) for s in sections], dtype=wp.vec3),
             wp.array(list(spacings), dtype=float),
             wp.array([seed & 0x7FFFFFFF for seed in seeds], dtype=int),
             wp.array(np.concatenate(shapes), dtype=int),
@@ -109,18 +105,13 @@ def place_rain(
     if crowded.size:
         width = 2e3 * min(sections[crowded[0]].half_sides)
         raise ValueError(
-            f"the rain finds no free place: grains of {2e3 * reaches[crowded[0]]:.2f} mm in a container of "
+            f"no free place for the rain: grains of {2e3 * reaches[crowded[0]]:.2f} mm in a container of "
             f"{width:.2f} mm; lower rain_rate, raise rain_speed or widen the container"
         )
     return [Rain(*world) for world in zip(grains, placed, orientations, strict=True)]
 
 
-def _row(section: CrossSection) -> tuple[float, float, float]:
-    """As the kernel takes it."""
-    return *section.half_sides, section.half_sides[0] if section.is_round else 0.0
-
-
 def _random_orientations(count: int, seed: int) -> np.ndarray:
-    """Uniformly distributed unit quaternions, (count, 4)."""
+    """Draw uniformly distributed unit quaternions, (count, 4)."""
     q = np.random.default_rng([seed, 1]).normal(size=(count, 4))
     return q / np.linalg.norm(q, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Base of every scene: worlds to start from, and a controller that leads each through its phases."""
+"""Interface of scenes: initial worlds, and a controller that leads each through its phases."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,41 +14,41 @@ from dem_warp.walls import Motion
 
 @dataclass(frozen=True)
 class Decision:
-    """Order of a scene to its world."""
+    """Instructions of a scene for its world."""
 
     remove: np.ndarray | None = None
-    """Grain slots to take out, (k,) int."""
+    """Grain slots to remove, (k,) int."""
     move: Mapping[int, Motion] = field(default_factory=dict)
-    """Walls to set in motion, by number, and their motions."""
+    """New motions of walls, by number."""
     done: bool = False
-    """The world has ended."""
+    """True if the world has ended."""
     failure: str = ""
-    """Reason of an end without a result; empty otherwise."""
+    """Reason of a failed end; empty otherwise."""
 
 
 class Observable(NamedTuple):
-    """Unit and definition of a number that a scene measures."""
+    """Unit and definition of a measured number."""
 
     unit: str
     meaning: str
 
 
 @dataclass
-class Course:
-    """Progress of a world: all that its controller remembers from one look to the next.
+class SceneState:
+    """State of a controller between two looks at its world.
 
-    A checkpoint keeps it as JSON, so its fields, and those that a scene adds in a subclass, are plain values.
+    A checkpoint keeps it as JSON, so its fields and those of subclasses are plain values.
     """
 
     phase: str
     phase_start: float = 0.0
-    """Time at which the phase began [s]."""
+    """Start time of the phase [s]."""
     slow_since: float | None = None
-    """Time since which the grains have been slow in this phase [s]."""
+    """Time since which the grains are slow in this phase [s]."""
     phases: list[dict[str, Any]] = field(default_factory=list)
-    """Name, time [s] and steps of each phase that has ended."""
+    """Name, duration [s] and steps of each ended phase."""
     observables: dict[str, float] = field(default_factory=dict)
-    """In the units that the scene says."""
+    """Measured numbers, in the units of the scene's `Observable`."""
 
     def enter(self, phase: str, view: WorldView) -> None:
         """Record the end of the present phase and begin another."""
@@ -57,17 +57,11 @@ class Course:
         self.phase, self.phase_start, self.slow_since = phase, view.time, None
 
 
-def course_of(kind: type[Any], values: Mapping[str, Any]) -> Any:
-    """Build the course of a kind from the plain values that a checkpoint kept.
-
-    Raises
-    ------
-    ValueError
-        When there are other fields, or a value is of another type.
-    """
+def restore_state(kind: type[Any], values: Mapping[str, Any]) -> Any:
+    """Build a state from the values in a checkpoint; raise ValueError for wrong fields or types."""
     hints = get_type_hints(kind)
     if odd := sorted(values.keys() ^ hints.keys()):
-        raise ValueError(f"{kind.__name__}: must have its fields, got a difference in {odd}")
+        raise ValueError(f"{kind.__name__}: missing or unknown fields {odd}")
     for name, value in values.items():
         if not _fits(value, hints[name]):
             raise ValueError(f"{kind.__name__}.{name}: must be {hints[name]}, got {value!r}")
@@ -75,7 +69,7 @@ def course_of(kind: type[Any], values: Mapping[str, Any]) -> Any:
 
 
 def _fits(value: Any, hint: Any) -> bool:
-    """Tell that a plain value is of an annotated type, its numbers finite."""
+    """Return True if a value has an annotated type, with finite numbers."""
     inner = get_args(hint)
     if hint is float:
         return type(value) in (int, float) and isfinite(value)
@@ -90,28 +84,28 @@ def _fits(value: Any, hint: Any) -> bool:
             return any(_fits(value, each) for each in inner)
 
 
-CourseT = TypeVar("CourseT", bound=Course)
+StateT = TypeVar("StateT", bound=SceneState)
 
 
-class Controller(Protocol[CourseT]):
-    """Leads one world; what it decides depends on that world alone."""
+class Controller(Protocol[StateT]):
+    """Controller of one world; its decisions depend on that world alone."""
 
     period: int
-    """Steps between two looks, a power of two of chunks; follows from the world alone."""
-    course: CourseT
-    """Nothing else in a controller changes, so that with its course it takes up a world half-way."""
+    """Steps between two looks: a power of two times the chunk."""
+    state: StateT
+    """The only part that changes: with it a controller continues a world."""
 
     def look(self, view: WorldView) -> Decision:
-        """Decide what happens next from the present state."""
+        """Decide what happens next."""
         ...
 
     def fraction(self, time: float) -> float:
-        """Roughly how much of the case is done at a simulated time [s], 0 to 1."""
+        """Return roughly the fraction done at a simulated time [s], 0 to 1."""
         ...
 
 
 class Scene(Protocol):
-    """A physical test, as its parameters."""
+    """Parameters of a physical test."""
 
     @property
     def observables(self) -> Mapping[str, Observable]:
@@ -119,13 +113,13 @@ class Scene(Protocol):
         ...
 
     def check_parts(self, names: Sequence[str]) -> None:
-        """Check that each name is that of a part of the walls; a ValueError says which there are."""
+        """Raise ValueError for a name that is no part of the walls."""
         ...
 
     def prepare(self, cases: Sequence[Any], device: Any) -> list[WorldSetup]:
-        """Worlds of cases (of this kind of scene, each with its own parameters) before the first step."""
+        """Return the initial worlds of cases of this kind of scene."""
         ...
 
     def controller(self, case: Any, setup: WorldSetup, chunk: int) -> Controller[Any]:
-        """Controller of one case, which looks at multiples of `chunk` steps."""
+        """Return the controller of one case, which looks at multiples of `chunk` steps."""
         ...

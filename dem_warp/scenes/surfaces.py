@@ -1,40 +1,38 @@
-"""The surface of a bed of grains, seen in columns of a grain's size: its level, its profile and its slope."""
+"""The surface of a bed of grains, in columns of a grain's size: its level, its profile and its slope."""
 
 import math
 
 import numpy as np
 
 TOP_OF_GRAIN = 0.5
-"""The surface lies this part of a grain's bounding radius above the highest centres."""
+"""Height of the surface above the highest centres, over a grain's bounding radius."""
 
 FLANK = (0.1, 0.9)
-"""A flank is fitted where it rises between these parts of its height, clear of its foot and of a flat top."""
+"""Parts of a flank's height between which it is fitted, to leave out its foot and a flat top."""
 
 LEAST_RISE = 4.0
-"""A flank that rises by less than this many bounding radii of a grain is none."""
+"""Least height of a flank, over a grain's bounding radius."""
 
 LEAST_POINTS = 3
-"""Points of a profile that a line is fitted to, at the least."""
+"""Least number of points for a line."""
 
 
 def column_tops(places: np.ndarray, heights: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """Highest centre of each square column that holds one.
+    """Return the highest centre of each occupied square column.
 
     Parameters
     ----------
-    places : (n, 2) array
-        Horizontal places of the centres [m].
-    heights : (n,) array
-        Their heights [m].
+    places, heights : (n, 2) and (n,) arrays
+        Centres [m].
     side : float
-        Of a column [m].
+        Side of a column [m].
 
     Returns
     -------
     columns : (k, 2) int array
-        Column [i, j] holds the places from i and j times `side` on, in order of first appearance.
+        Column [i, j] begins at i and j times `side`; in order of first appearance.
     tops : (k,) array
-        [m]
+        Heights [m].
     """
     cells = np.floor(places / side).astype(int)
     i, j = (cells - cells.min(axis=0)).T
@@ -48,18 +46,10 @@ def column_tops(places: np.ndarray, heights: np.ndarray, side: float) -> tuple[n
 
 
 def bed_level(positions: np.ndarray, half_sides: tuple[float, float], reach: float) -> float:
-    """Height of a bed's surface in a container [m]; 0 without grains.
+    """Return the height of a bed's surface in a container [m]; 0 without grains.
 
-    It is the mean, over columns of a grain's size, of the highest centre, plus half a grain.
-
-    Parameters
-    ----------
-    positions : (n, 3) array
-        Grain centres [m].
-    half_sides : 2 floats
-        Of the container, along x and y [m]: its columns are counted from a corner.
-    reach : float
-        Bounding radius of a grain [m].
+    It is the mean over columns of the highest centre, plus half a bounding radius (`reach` [m]) of a grain.
+    Columns are counted from a corner of the container, of `half_sides` [m] along x and y.
     """
     if not len(positions):
         return 0.0
@@ -68,19 +58,9 @@ def bed_level(positions: np.ndarray, half_sides: tuple[float, float], reach: flo
 
 
 def profile(positions: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Surface of a bed that is the same all along y: the highest centres over x, averaged along y.
+    """Return the surface of a bed that is uniform along y: middles of columns, ascending, and heights [m].
 
-    Parameters
-    ----------
-    positions : (n, 3) array
-        Grain centres [m].
-    reach : float
-        Bounding radius of a grain [m].
-
-    Returns
-    -------
-    x, z : (k,) arrays
-        Middles of the columns, in ascending order, and heights [m].
+    The heights are the highest centres, averaged along y; `reach` is the bounding radius of a grain [m].
     """
     side = 2 * reach
     columns, tops = column_tops(positions[:, :2], positions[:, 2], side)
@@ -90,7 +70,7 @@ def profile(positions: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray
 
 
 def slope(x: np.ndarray, z: np.ndarray) -> float | None:
-    """Gradient dz/dx of the least-squares line through a profile; None for fewer than LEAST_POINTS."""
+    """Return the gradient dz/dx of the least-squares line; None for fewer than LEAST_POINTS."""
     if len(x) < LEAST_POINTS:
         return None
     offset = x - x.mean()
@@ -98,15 +78,15 @@ def slope(x: np.ndarray, z: np.ndarray) -> float | None:
 
 
 def flank_angle(x: np.ndarray, z: np.ndarray, reach: float) -> float | None:
-    """Inclination of a flank [deg], None where it is too low or too short to be seen.
+    """Return the inclination of a flank [deg], or None if it is too low or too short.
 
-    It is that of the least-squares line from the first to the last point within FLANK of the height. All
-    points in between count: a choice by height alone would favour those that make the line flatter.
+    It is the slope of the least-squares line from the first to the last point within FLANK of the height. All
+    points between count: a choice by height alone would make the line flatter.
 
     Parameters
     ----------
     x, z : (n,) arrays
-        A profile that rises, or falls, from one end to the other, x ascending [m].
+        Profile from one end of the flank to the other, x ascending [m].
     reach : float
         Bounding radius of a grain [m].
     """

@@ -33,7 +33,7 @@ KEPT = 24
 
 @dataclass
 class Glimpses:
-    """Takes glimpses of the worlds of a batch; an onlooker of `dem_warp.simulate`.
+    """Takes glimpses of the worlds of a batch; for `dem_warp.simulate(on_advance=)`.
 
     A file that cannot be written is left out: no run ends because nobody could watch it.
     """

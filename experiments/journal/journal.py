@@ -67,7 +67,7 @@ class Journal:
     def __init__(self, folder: Path, command: str, study: Study, resume: bool = False, **facts: Any) -> None:
         self.folder = folder / JOURNAL
         self.glimpses = Glimpses(self.folder / GLIMPSES)
-        """Onlooker of the run's batches."""
+        """Callback after each advance of the run's batches."""
         self._run = {
             "format": FORMAT,
             "command": command,

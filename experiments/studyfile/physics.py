@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -17,7 +16,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, ShapeMixture, WallPart
 from dem_warp.laws.mechanism import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
-from dem_warp.scenes.poured_scene import PouredScene
+from dem_warp.scenes.poured_scene import PouredScene, TooManyGrainsError
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.proportions import narrowness
@@ -33,8 +32,6 @@ LEAST_SIZE, LARGEST_SIZE = 1e-6, 1e6
 MOST_GRAINS = 20_000_000
 """Grains of a case: more fill a GPU of 140 GB."""
 
-_ENGINES_LIMIT = re.compile(r"\w+: (must hold at most .+), got ([\d.e+]+|inf): .+")
-"""Words of `PouredScene.supply`: rule and number."""
 
 
 class GrainCountError(ValueError):
@@ -284,10 +281,8 @@ def _check_supply(case: Case) -> None:
         grains = case.scene.supply(case)
     except OverflowError:  # a length whose square is beyond all floats
         grains = math.inf
-    except ValueError as error:
-        if (told := _ENGINES_LIMIT.fullmatch(str(error))) is None:
-            raise
-        raise GrainCountError(f"{told[1]}: {advice}", f"{float(told[2]):,.0f}") from None
+    except TooManyGrainsError as error:
+        raise GrainCountError(f"{error.rule}: {advice}", f"{error.count:,.0f}") from None
     if grains > MOST_GRAINS:
         raise GrainCountError(f"must have at most {MOST_GRAINS:,} grains a case: {advice}", f"{grains:,}")
 

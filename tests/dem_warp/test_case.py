@@ -40,7 +40,7 @@ from dem_warp.laws.linear_cohesion import LinearCohesion
         (lambda: GrainPopulation(PYRAMID, GRAIN, size_sd=-0.1), r"size_sd: must be at least 0 .* got -0.1"),
         (lambda: Numerics(time_step_fraction=1.5), r"time_step_fraction: .* at most 1, got 1.5"),
         (lambda: Numerics(skin=0.0), r"Numerics.skin: must be positive and finite \[m\], got 0.0"),
-        (lambda: Numerics(precision="half"), r"precision: must be one of \['double', 'mixed'\], got 'half'"),
+        (lambda: Numerics(precision="half"), r"precision: must be one of mixed, double, got 'half'"),
         (lambda: Numerics(modulus_scale=0.5), r"modulus_scale: must be at least 1, got 0.5"),
         (lambda: replace(small_case(), seed=-1), r"Case.seed: must be an integer from 0 .* got -1"),
     ],

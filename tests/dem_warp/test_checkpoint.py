@@ -22,7 +22,7 @@ from dem_warp import Case, CaseResult, simulate
 from dem_warp.batch import Batch
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
-from dem_warp.scenes.lifted_cylinder import Lift
+from dem_warp.scenes.lifted_cylinder import LiftState
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.solver import CHUNK
 from dem_warp.walls import Motion
@@ -102,9 +102,9 @@ def marked(folder: Path, *cases: Case) -> None:
     for case in cases:
         batch = start(case)
         kept = Checkpoints(folder)
-        course, snapshot = kept.load(case, batch.maker)
-        course["observables"]["taken_up"] = 1.0
-        kept.save(case, batch.maker, Lift(**course), snapshot)
+        state, snapshot = kept.load(case, batch.maker)
+        state["observables"]["taken_up"] = 1.0
+        kept.save(case, batch.maker, LiftState(**state), snapshot)
 
 
 def without_mark(result: CaseResult) -> CaseResult:
@@ -174,7 +174,7 @@ simulate(ENDLESS, DEVICE, on_progress=lambda p: print(p.phase_counts.get("lift",
         while whole.steps[0] < resumed.steps[w]:
             whole.advance()
         assert whole.steps[0] == resumed.steps[w] > left_at[w] > 0
-        assert resumed.controllers[w].course == whole.controllers[0].course
+        assert resumed.controllers[w].state == whole.controllers[0].state
         assert_same_bits(state(resumed.solver, w), state(whole.solver))
 
 
@@ -255,7 +255,7 @@ def test_a_damaged_checkpoint_is_named_and_only_its_case_starts_afresh(left, tmp
         batch = start(handful(5), small_case(), folder=tmp_path)
     assert batch.steps == [other.steps[0], 0]
     assert str(Checkpoints(tmp_path).path(small_case())) in caplog.text
-    assert "starts afresh: must be a whole file" in caplog.text
+    assert "starts again: the file is damaged" in caplog.text
     assert_same_bits(take_snapshot(batch.solver, 1), take_snapshot(start(small_case()).solver, 0))
 
 
@@ -287,7 +287,7 @@ def test_a_run_goes_on_where_no_checkpoint_can_be_written(tmp_path, caplog):
     with caplog.at_level(logging.WARNING):
         batch.advance()
     assert batch.steps[0] > 0
-    assert "no checkpoint could be written" in caplog.text
+    assert "cannot write the checkpoint" in caplog.text
 
 
 def test_an_interval_is_not_negative(tmp_path):

@@ -201,11 +201,11 @@ def test_a_file_may_hold_comments_and_blank_lines(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("0 0 0 1\n0 0 1\n", r"clump.txt, line 2: a sphere is four finite numbers .* got '0 0 1'"),
+        ("0 0 0 1\n0 0 1\n", r"clump.txt, line 2: must be four finite numbers .* got '0 0 1'"),
         ("0 0 0 one\n", r"clump.txt, line 1: .* got '0 0 0 one'"),
         ("# head\n0 0 0 -1\n", r"clump.txt, line 2: .* with r > 0, got '0 0 0 -1'"),
         ("0 nan 0 1\n", r"clump.txt, line 1: .* finite"),
-        ("# nothing\n", r"clump.txt: a clump needs at least one line"),
+        ("# nothing\n", r"clump.txt: must have at least one line"),
     ],
 )
 def test_a_bad_file_is_refused_with_its_line(tmp_path, text, message):
@@ -223,10 +223,10 @@ def test_a_missing_file_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("centers", "radii", "message"),
     [
-        (np.zeros((2, 3)), [1.0], r"got shapes \(2, 3\) and \(1,\)"),
+        (np.zeros((2, 3)), [1.0], r"got \(2, 3\) and \(1,\)"),
         (np.zeros((0, 3)), [], "S >= 1"),
-        (np.zeros((2, 3)), [1.0, 0.0], "sphere 1: its radius must be finite and positive"),
-        ([[0.0, 0.0, math.inf]], [1.0], "sphere 0: its center must be finite"),
+        (np.zeros((2, 3)), [1.0, 0.0], r"radii\[1\]: must be positive and finite"),
+        ([[0.0, 0.0, math.inf]], [1.0], r"centers\[0\]: must be finite"),
     ],
 )
 def test_bad_spheres_are_refused(centers, radii, message):
@@ -235,11 +235,11 @@ def test_bad_spheres_are_refused(centers, radii, message):
 
 
 def test_impossible_mass_properties_are_refused():
-    with pytest.raises(ValueError, match="volume must be finite and positive"):
+    with pytest.raises(ValueError, match="volume: must be positive and finite"):
         ClumpShape(np.zeros((1, 3)), np.ones(1), -1.0, np.ones(3))
-    with pytest.raises(ValueError, match="inertia_over_mass must be three positive moments"):
+    with pytest.raises(ValueError, match="inertia_over_mass: must be three positive moments"):
         ClumpShape(np.zeros((1, 3)), np.ones(1), 1.0, np.zeros(3))
-    with pytest.raises(ValueError, match="resolution must be 1 or more, got 0"):
+    with pytest.raises(ValueError, match="resolution: must be 1 or more, got 0"):
         ClumpShape.from_spheres(np.zeros((1, 3)), [1.0], resolution=0)
 
 

@@ -389,7 +389,7 @@ def test_mechanisms_at_their_nulls_reach_no_further_than_touch():
 @pytest.mark.parametrize(
     ("kind", "values", "message"),
     [
-        (WallAdhesion, {"between": "all"}, r"WallAdhesion.between: must be 'walls', got 'all'"),
+        (WallAdhesion, {"between": "all"}, r"WallAdhesion.between: must be one of walls, got 'all'"),
         (CapillaryBridge, {"surface_tension": 0.07}, r"CapillaryBridge.bridge_volume: .* got 0.0"),
         (CapillaryBridge, {"contact_angle": 1.6}, r"CapillaryBridge.contact_angle: .* got 1.6"),
     ],

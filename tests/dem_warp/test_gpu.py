@@ -13,7 +13,7 @@ from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
 from dem_warp.model import WorldSetup
 from dem_warp.solver import Solver
-from dem_warp.types import Care
+from dem_warp.types import CheckRate
 from dem_warp.walls import Mesh, Motion, Plane
 
 resolve_device(None)  # starts Warp, quietly, before it is asked for devices
@@ -60,10 +60,10 @@ def test_the_batch_does_not_change_the_bits():
 
 def test_lists_made_anew_where_grains_have_moved_or_all_before_every_step_give_the_same_bits():
     runs, rebuilds = [], []
-    for care in (Care.USUAL, Care.EVERY_STEP):
+    for care in (CheckRate.USUAL, CheckRate.EVERY_STEP):
         solver = solve(turning_drum(), precision="mixed", device="cuda")
         set_in_motion(solver, 0)
-        solver.care = care
+        solver.check_rate = care
         solver.advance(30)
         assert not solver.flags.numpy().any()
         runs.append(state(solver))

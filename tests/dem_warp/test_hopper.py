@@ -9,7 +9,7 @@ from worlds import GRAIN, GRAVITY, STEEL, assert_measured_as_told, assert_same_r
 from dem_warp import Case, CaseResult, Hopper
 from dem_warp.batch import Batch
 from dem_warp.checkpoint import Checkpoints
-from dem_warp.scenes.discharge import Discharge
+from dem_warp.scenes.discharge import DischargeState
 
 BALL_DIAMETER = 4e-3
 CLOSED, NARROW, WIDE = 3e-3, 14e-3, 20e-3
@@ -101,11 +101,11 @@ def test_a_hopper_gives_the_same_bits_alone_and_resumed(runs, tmp_path):
     batch, results = Batch([case], "cpu", kept), []
     while batch.running:
         results += batch.advance()
-        if batch.phase(0) == "discharge" and len(batch.controllers[0].course.fallen) == 8:
+        if batch.phase(0) == "discharge" and len(batch.controllers[0].state.fallen) == 8:
             batch.save()
     assert_same_result(results[0][1], runs[WIDE])
     resumed, results = Batch([case], "cpu", kept), []
-    assert len(resumed.controllers[0].course.fallen) == 8
+    assert len(resumed.controllers[0].state.fallen) == 8
     while resumed.running:
         results += resumed.advance()
     assert_same_result(results[0][1], runs[WIDE])
@@ -115,10 +115,10 @@ def test_the_rate_is_that_of_the_steady_part():
     # Nothing for a second, then 2 kg/s up to 10 kg, and slower from there on; 20 to 70 % is the fast part.
     time = np.arange(0.0, 12.0, 0.25)
     mass = np.interp(time, [0.0, 1.0, 6.0, 10.0, 12.0], [0.0, 0.0, 10.0, 12.0, 12.0])
-    course = Discharge("discharge", fallen=np.column_stack([time, mass]).tolist())
-    assert course.flow_rate == pytest.approx(2.0, rel=1e-12)
-    assert course.last_fall == 10.0
-    assert Discharge("discharge", fallen=[[0.0, 0.0], [1.0, 5.0]]).flow_rate is None
+    state = DischargeState("discharge", fallen=np.column_stack([time, mass]).tolist())
+    assert state.flow_rate == pytest.approx(2.0, rel=1e-12)
+    assert state.last_fall == 10.0
+    assert DischargeState("discharge", fallen=[[0.0, 0.0], [1.0, 5.0]]).flow_rate is None
 
 
 @pytest.mark.parametrize(

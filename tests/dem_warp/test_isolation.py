@@ -177,10 +177,10 @@ def test_worlds_of_a_batch_need_the_same_number_of_walls():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"time_step": 0.0}, "time_step: must be positive and finite, got 0.0"),
-        ({"skin": float("nan")}, "skin: must be positive and finite, got nan"),
-        ({"speed_limit": -1.0}, "speed_limit: must be positive and finite, got -1.0"),
-        ({"weighed": 2}, "weighed: must number a wall, 0 to 1, got 2"),
+        ({"time_step": 0.0}, "time_step: must be positive and finite .s., got 0.0"),
+        ({"skin": float("nan")}, "skin: must be positive and finite .m., got nan"),
+        ({"speed_limit": -1.0}, "speed_limit: must be positive and finite .m/s., got -1.0"),
+        ({"weighed": 2}, "weighed: must be the number of a wall, 0 to 1, got 2"),
         ({"domain": ((0.0, 0.0, 0.0), (1.0, -1.0, 1.0))}, "domain: lower corner must lie below the upper"),
         ({"walls": ((Plane(), 2), (Plane(), 1))}, "WorldSetup.walls: .*2"),
     ],
@@ -194,7 +194,7 @@ def test_grains_refuse_arrays_that_do_not_fit():
     bodies = grains([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
     with pytest.raises(ValueError, match=r"Grains.sizes: must have shape \(2,\), got \(3,\)"):
         replace(bodies, sizes=np.ones(3))
-    with pytest.raises(ValueError, match=r"Grains.positions: must be finite, grains \[1\] are not"):
+    with pytest.raises(ValueError, match=r"Grains.positions: must be finite, got others for grains \[1\]"):
         replace(bodies, positions=np.array([[0.0, 0.0, 0.0], [np.inf, 0.0, 0.0]]))
-    with pytest.raises(ValueError, match=r"Grains.densities: must be positive, grains \[0\] are not"):
+    with pytest.raises(ValueError, match=r"Grains.densities: must be positive, got others for grains \[0\]"):
         replace(bodies, densities=np.array([0.0, 1.0]))

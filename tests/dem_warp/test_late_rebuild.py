@@ -9,7 +9,7 @@ from worlds import PYRAMID, SMALL_TUBE, assert_same_result, run_batch, small_cas
 from dem_warp import Case, batch, simulate, solver
 from dem_warp.rollback import Rollback
 from dem_warp.scenes.poured_scene import default_skin
-from dem_warp.types import Care
+from dem_warp.types import CheckRate
 
 FEW = replace(SMALL_TUBE, grain_count=24)
 """Three layers, of which grains outrun their lists in the rain and at the lift, two dozen times."""
@@ -52,13 +52,13 @@ def test_steps_are_taken_again_with_a_closer_look_first(heap, monkeypatch):
     cares, advance = [], solver.Solver.advance
 
     def note(self, chunks):
-        cares.append(self.care)
+        cares.append(self.check_rate)
         advance(self, chunks)
 
     monkeypatch.setattr(solver.Solver, "advance", note)
     [result] = simulate([few(skin=2e-4)], device="cpu", workers=1)
     assert_same_result(result, heap)
-    assert set(cares) == set(Care)
+    assert set(cares) == set(CheckRate)
     assert all(now <= before + 1 for before, now in pairwise(cares))
 
 
@@ -79,7 +79,7 @@ def test_no_skin_gives_another_heap(heap, skin):
         assert_same_result(result, heap)
     else:
         assert result.status == "failed"
-        assert "outran the neighbour lists within a step" in result.reason
+        assert "too fast for the neighbour lists" in result.reason
         assert "raise numerics.skin" in result.reason
 
 

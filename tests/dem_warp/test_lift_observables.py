@@ -172,7 +172,7 @@ def fallen(given: Callable[[float], float]) -> dict[str, float]:
         overview = [each.item() for each in overviews(positions[None], moving[None], alive[None])]
         return WorldView(step, time, alive, alive, positions, moving, masses, impulse, *overview)
 
-    seen, step = controller.course.observables, 0
+    seen, step = controller.state.observables, 0
     seen |= {"fill_height": height, "grain_count": float(count)}
     controller.begin(view(0), alive)
     while "t55" not in seen:

@@ -211,7 +211,7 @@ def test_no_cases_give_no_results():
 
 
 def test_an_unknown_device_is_refused():
-    with pytest.raises(ValueError, match=r"the device must be one of .*cpu.*, not gpu"):
+    with pytest.raises(ValueError, match=r"device: must be one of .*cpu.*, got 'gpu'"):
         simulate([small_case()], device="gpu")
 
 

@@ -94,20 +94,20 @@ def test_a_contact_takes_a_mechanism_once():
 
 
 def test_mechanisms_that_build_on_different_springs_do_not_share_a_contact():
-    with pytest.raises(ValueError, match=r"jkr must not stand beside hysteretic_spring"):
+    with pytest.raises(ValueError, match=r"jkr excludes hysteretic_spring"):
         pair(mechanisms=(HystereticSpring(plasticity=0.1), JKR(work_of_adhesion=0.1)))
 
 
 def test_one_batch_holds_one_set_of_mechanisms():
-    with pytest.raises(ValueError, match=r"worlds of one batch must have the same mechanisms"):
+    with pytest.raises(ValueError, match=r"all in a batch must have the same mechanisms"):
         solve(oblique_impact(), with_mechanism(oblique_impact(), LinearCohesion()))
 
 
 @pytest.mark.parametrize(
     ("hook", "message"),
     [
-        ("rolling", r"at most one law of rolling resistance, got \['a', 'b'\]"),
-        ("slider", r"at most one law in place of the tangential spring, got \['a', 'b'\]"),
+        ("rolling", r"at most one may replace the rolling resistance, got \['a', 'b'\]"),
+        ("slider", r"at most one may replace the tangential spring, got \['a', 'b'\]"),
     ],
 )
 def test_what_a_mechanism_replaces_it_replaces_alone(hook, message):

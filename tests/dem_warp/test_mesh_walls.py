@@ -204,7 +204,7 @@ def test_neighbours_of_a_triangle_are_those_that_share_corners():
     table = TriangleTable.of(BOX)
     for i, mine in enumerate(table.corners):
         found = dict.fromkeys(range(len(table.corners)), 0)
-        for entry in table.beside[table.first[i] : table.first[i] + table.count[i]].tolist():
+        for entry in table.adjacent[table.first[i] : table.first[i] + table.count[i]].tolist():
             found[entry >> 3] |= entry & 7
         for j, theirs in enumerate(table.corners):
             shared = sum(1 << k for k in range(3) if (theirs == mine[k]).all(axis=1).any())
@@ -277,7 +277,7 @@ def test_worlds_with_and_without_meshes_run_apart():
         (CORNERS, [[0, 1]], r"Mesh.faces: must be integers, shape \(m, 3\), got int64 of shape \(1, 2\)"),
         (CORNERS, [[0.0, 1.0, 2.0]], "Mesh.faces: must be integers, .* got float64"),
         (CORNERS, [[0, 1, 2], [0, 1, 8]], r"from 0 to 7, got others in triangles \[1\]"),
-        (CORNERS, [[0, 1, 2], [0, 0, 3]], r"must span an area, triangles \[1\] do not"),
+        (CORNERS, [[0, 1, 2], [0, 0, 3]], r"must have an area, got triangles \[1\] without"),
     ],
 )
 def test_a_mesh_refuses_bad_values(vertices, faces, message):

@@ -46,7 +46,7 @@ class Loss:
 def signed(folder: Path, processes: Processes) -> set[str]:
     """Numbers of the processes that simulate the cases."""
     folder.mkdir()
-    simulate(CASES, "cpu", processes, onlooker=Signature(folder))
+    simulate(CASES, "cpu", processes, on_advance=Signature(folder))
     return {path.name for path in folder.iterdir()}
 
 
@@ -70,7 +70,7 @@ def test_a_case_has_the_same_bits_whatever_its_process_has_simulated_before() ->
 def test_the_cases_of_a_lost_process_go_on_in_another_one(tmp_path: Path) -> None:
     ended: list[int] = []
     alone = [simulate([case], "cpu", 1)[0] for case in CASES]
-    found = simulate(CASES, "cpu", 2, lambda index, _: ended.append(index), onlooker=Loss(tmp_path, 2))
+    found = simulate(CASES, "cpu", 2, lambda index, _: ended.append(index), on_advance=Loss(tmp_path, 2))
     assert sorted(ended) == [0, 1, 2]
     for one, other in zip(alone, found, strict=True):
         assert_same_result(one, other)
@@ -78,8 +78,8 @@ def test_the_cases_of_a_lost_process_go_on_in_another_one(tmp_path: Path) -> Non
 
 def test_a_call_whose_processes_are_lost_again_and_again_is_given_up(tmp_path: Path) -> None:
     with Processes(2) as processes:
-        with pytest.raises(BrokenProcessPool, match="again and again"):
-            simulate(CASES, "cpu", processes, onlooker=Loss(tmp_path, 100))
+        with pytest.raises(BrokenProcessPool, match="lost repeatedly"):
+            simulate(CASES, "cpu", processes, on_advance=Loss(tmp_path, 100))
         assert {result.status for result in simulate(CASES, "cpu", processes)} == {"finished"}
 
 

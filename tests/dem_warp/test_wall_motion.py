@@ -307,7 +307,7 @@ def test_an_order_to_stay_where_it_is_changes_nothing():
     [
         (lambda: Motion(velocity=(0.0, math.nan, 0.0)), "Motion.velocity: must be three finite numbers"),
         (lambda: Motion(spin=(1.0, 2.0)), r"Motion.spin: must be three finite numbers, got \(1.0, 2.0\)"),
-        (lambda: Motion(frequency=-1.0), "Motion.frequency: must be finite and not negative, got -1.0"),
+        (lambda: Motion(frequency=-1.0), "Motion.frequency: must be finite and 0 or more .Hz., got -1.0"),
         (lambda: Motion(amplitude=(0.0, 0.0, 1e-3)), "Motion.frequency: must be positive with amplitude"),
     ],
 )

@@ -109,7 +109,7 @@ def test_an_entry_that_cannot_be_used_is_named_and_hurts_no_other(together: dict
         "package grain-magnets, entry forgotten = grain_magnets.forgotten:Nothing of dem_"
     )
     assert "No module named 'grain_magnets.forgotten'" in missing
-    assert taken.endswith("dem_warp.laws: left out, ValueError: the name is taken")
+    assert taken.endswith("dem_warp.laws: skipped, ValueError: the name is in use")
     assert "Parameter.unit: must be one of 1, m, " in unknown
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import warp as wp
 
 from dem_warp import Case, CaseResult, Processes, simulate
-from dem_warp.batch import Onlooker
+from dem_warp.batch import OnAdvance
 from dem_warp.checkpoint import CHECKPOINT_EVERY
 from dem_warp.device import resolve_device
 from dem_warp.result import OnProgress, OnResult
@@ -37,8 +37,8 @@ class OwnWorkers:
     """``"cpu"``, ``"cuda"`` or ``"cuda:1"``; None: the GPU if there is one."""
     workers: int | None = None
     """Processes on the CPU; None: one a core."""
-    onlooker: Onlooker | None = None
-    """Onlooker of the batches of dem-warp's own engine."""
+    on_advance: OnAdvance | None = None
+    """Callback after each advance of a batch of dem-warp's own engine."""
     processes: Processes | None = None
     """Processes that stay from wave to wave; None: a wave starts its own."""
     notes_speed: bool = True
@@ -100,7 +100,7 @@ class OwnWorkers:
 
         def run(batch: int, members: list[int]) -> None:
             every = checkpoint_interval(len(members) if self.on_gpu else 1)
-            own = partial(simulate, onlooker=self.onlooker, checkpoint_every=every)
+            own = partial(simulate, on_advance=self.on_advance, checkpoint_every=every)
             processes = self.processes or self.workers
             simulator = partial(engine, workers=self.workers) if engine else partial(own, workers=processes)
             simulator(
@@ -131,9 +131,9 @@ def checkpoint_interval(worlds: int) -> float:
     return CHECKPOINT_EVERY * max(1.0, worlds / CHEAP_WORLDS)
 
 
-def watched_by(workers: Workers, onlooker: Onlooker) -> Workers:
+def watched_by(workers: Workers, on_advance: OnAdvance) -> Workers:
     """Return workers whose batches are looked at, where they are this machine's own."""
-    return replace(workers, onlooker=onlooker) if isinstance(workers, OwnWorkers) else workers
+    return replace(workers, on_advance=on_advance) if isinstance(workers, OwnWorkers) else workers
 
 
 THIS_MACHINE = OwnWorkers()

@@ -145,12 +145,12 @@ def _state(batch: Batch, world: int, view: WorldView) -> dict[str, np.ndarray]:
 
 def _elapsed(batch: Batch, world: int, view: WorldView) -> dict[str, float]:
     """Progress of a column in each phase, in the parts of which MOMENTS speaks."""
-    course, setup, scene = batch.controllers[world].course, batch.setups[world], batch.cases[world].scene
+    state, setup, scene = batch.controllers[world].state, batch.setups[world], batch.cases[world].scene
     rain = float(setup.grains.release_steps.max()) * setup.time_step
-    lifting = course.phase == "lift"
-    since = view.time - course.phase_start
+    lifting = state.phase == "lift"
+    since = view.time - state.phase_start
     return {
-        "filling": view.time / rain if course.phase == "fill" else 0.0,
+        "filling": view.time / rain if state.phase == "fill" else 0.0,
         "settled": float(lifting),
         "lifting": since * scene.lift_speed / scene.diameter if lifting else 0.0,
     }

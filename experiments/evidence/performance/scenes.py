@@ -96,10 +96,10 @@ def run(sketch: Sketch, radius: float, device: str) -> tuple[CaseResult, Picture
     while picture is None or not ended:
         ended = batch.advance()
         [view] = batch.solver.view([0])
-        course = controller.course
-        if course.phase in ("fill", "settle"):
+        state = controller.state
+        if state.phase in ("fill", "settle"):
             settled = view.positions[:, 2].copy()
-        at_moment = course.phase == sketch.phase and view.time - course.phase_start >= sketch.after
+        at_moment = state.phase == sketch.phase and view.time - state.phase_start >= sketch.after
         if picture is None and (ended or at_moment):
             picture = _draw(sketch, batch, view, settled)
     return ended[0][1], picture

@@ -198,21 +198,21 @@ def test_a_test_with_walls_of_several_materials_leaves_for_no_other_code(drum: S
 @pytest.mark.parametrize(
     ("test", "add", "place", "rule"),
     [
-        (DRUM, "[walls.lid]\nstatic_friction = 0.1\n", "walls.lid", "the walls have the parts shell, ends"),
-        (TUBE, "[walls.ends]\nstatic_friction = 0.1\n", "walls.ends", "the walls have the parts plate, tube"),
+        (DRUM, "[walls.lid]\nstatic_friction = 0.1\n", "walls.lid", "must be one of shell, ends"),
+        (TUBE, "[walls.ends]\nstatic_friction = 0.1\n", "walls.ends", "must be one of plate, tube"),
         (DRUM, "[walls.ends]\nfriction = 0.1\n", "walls.ends.friction", "unknown key"),
         (DRUM, "[walls.ends]\nstatic_friction = -1\n", "walls.ends.static_friction", "greater than or equal"),
         (
             TUBE + "plate_friction = 0.3\n",
             "[walls.plate]\nstatic_friction = 0.1\n",
             "walls.plate",
-            "a plate of its own material has its friction there",
+            "must be left out if the plate has its own material",
         ),
         (DRUM + 'inclination = "95 deg"\n', "", "scene.drum.inclination", "less than 90"),
         (DRUM + "filling = 0.9\n", "", "scene.drum.filling", "less than or equal to 0.8"),
         (DRUM + 'picture = "top"\n', "", "scene.drum.picture", "'depth', 'silhouette' or 'end'"),
-        (DRUM + 'camera_distance = "1 m"\n', "", "scene.drum", "must be left out of a picture other than"),
-        (DRUM + 'inclination = "80 deg"\n', "", "scene.drum", "must leave the bed at the lower end below"),
+        (DRUM + 'camera_distance = "1 m"\n', "", "scene.drum", "must be left out with the picture depth"),
+        (DRUM + 'inclination = "80 deg"\n', "", "scene.drum", "the bed at the lower end must be below"),
     ],
 )
 def test_what_a_test_cannot_have_is_named_with_its_place(

@@ -224,7 +224,7 @@ def test_a_mesh_names_no_other_file(tmp_path: Path) -> None:
     for kind in ("3mf", "zip", "gltf", "glb", "dae"):
         path = tmp_path / f"a.{kind}"
         path.write_bytes(b"anything")
-        with pytest.raises(ValueError, match="a mesh file is one of stl, obj, ply, off"):
+        with pytest.raises(ValueError, match="must end in stl, obj, ply, off"):
             read_mesh(path)
 
 

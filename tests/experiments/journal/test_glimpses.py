@@ -32,7 +32,7 @@ def test_a_case_that_is_looked_at_ends_in_the_same_bits(
             assert len(spheres) <= 30
             seen.append(facts["fraction"])
 
-    [watched] = simulate([case], device="cpu", workers=1, onlooker=look)
+    [watched] = simulate([case], device="cpu", workers=1, on_advance=look)
     assert len(seen) > 10
     assert seen == sorted(seen)
     for name in ("positions", "orientations", "sizes", "shapes"):

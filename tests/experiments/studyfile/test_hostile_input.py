@@ -160,7 +160,7 @@ HOSTILE = {
     "unknown condition": measured(HEAD + "bsae,1,flank_angle,30,deg\n", "m.csv:2", "base", "bsae"),
     "a number in words": measured(HEAD + "base,1,flank_angle,thirty,deg\n", "m.csv:2", "number", "thirty"),
     # Grains
-    "no such shape": Hostile("clump cube:2 --spheres 3", ("cube:2", "a solid is one of")),
+    "no such shape": Hostile("clump cube:2 --spheres 3", ("cube:2", "must be one of")),
     "no such file": Hostile("clump g.stl --spheres 3", ("g.stl: no such file",)),
     "a solid and no number": Hostile("clump sphere:2", ("--spheres", "needs one of the two", "neither")),
     "number and tolerance": Hostile(

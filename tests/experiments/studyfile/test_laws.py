@@ -82,7 +82,7 @@ def test_a_new_study_has_the_relative_law_and_shipped_ones_name_theirs(tmp_path:
         (
             '[solver]\nlaws = "relative"\n[mechanism.elastic_plastic_rolling]\nrolling_stiffness = 2.25\n',
             "solver.laws",
-            "must be 'own_spin' beside the mechanism elastic_plastic_rolling, got 'elastic_plastic'",
+            "must be 'own_spin' with the mechanism elastic_plastic_rolling, got 'elastic_plastic'",
         ),
     ],
 )

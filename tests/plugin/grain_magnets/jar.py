@@ -9,7 +9,7 @@ from dem_warp.parameters import Parameter
 from dem_warp.scenes.poured_controller import Phase, PouredController
 from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.scenes.rain import CrossSection
-from dem_warp.scenes.scene import Course, Decision
+from dem_warp.scenes.scene import SceneState, Decision
 from dem_warp.walls import Cylinder, Disc
 
 
@@ -45,14 +45,14 @@ class Jar(PouredScene):
         return self.diameter / 2.0 + 2.0 * reach, self.diameter / 2.0 + 2.0 * reach, -2.0 * reach
 
     def controller(self, case: Any, setup: Any, chunk: int) -> "JarController":
-        return JarController(case, setup, chunk, Course("fill"))
+        return JarController(case, setup, chunk, SceneState("fill"))
 
 
-class JarController(PouredController[Course]):
+class JarController(PouredController[SceneState]):
     """Phases of one jar: fill, settle, stand."""
 
     def begin(self, view: Any, kept: Any) -> dict[int, Any]:
-        self.course.enter("stand", view)
+        self.state.enter("stand", view)
         return {}
 
     def look(self, view: Any) -> Decision:

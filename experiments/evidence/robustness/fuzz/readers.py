@@ -27,7 +27,7 @@ from dem_warp import (
 )
 from dem_warp.batch import Batch
 from dem_warp.checkpoint import Checkpoints
-from dem_warp.scenes.scene import course_of
+from dem_warp.scenes.scene import restore_state
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.solids import read_mesh
 from doe import DesignError
@@ -195,8 +195,8 @@ def checkpoint(folder: Path) -> Reader:
     batch, checkpoints = Batch([_case()], "cpu"), Checkpoints(folder)
     for _ in range(3):
         batch.advance()
-    case, course, snapshot = batch.cases[0], batch.controllers[0].course, take_snapshot(batch.solver, 0)
-    checkpoints.save(case, batch.maker, course, snapshot)
+    case, state, snapshot = batch.cases[0], batch.controllers[0].state, take_snapshot(batch.solver, 0)
+    checkpoints.save(case, batch.maker, state, snapshot)
     path = checkpoints.path(case)
 
     def read(path: Path) -> dict[str, Any]:
@@ -205,10 +205,10 @@ def checkpoint(folder: Path) -> Reader:
             return {}
         values, taken = found
         put_snapshot(batch.solver, 0, taken)
-        return {"course": asdict(course_of(type(course), values)), **take_snapshot(batch.solver, 0)}
+        return {"state": asdict(restore_state(type(state), values)), **take_snapshot(batch.solver, 0)}
 
     refusals = (ValueError, TypeError, LookupError)
-    facts = {"course": asdict(course), **snapshot}
+    facts = {"state": asdict(state), **snapshot}
     return Reader({path.name: path.read_bytes()}, read, refusals, path.name, True, facts)
 
 

@@ -93,7 +93,7 @@ def area_of_disagreement(places: np.ndarray, a: np.ndarray, b: np.ndarray, radiu
 
 @dataclass
 class EdgeWatch:
-    """Reads the edges of running drums; an onlooker of `dem_warp.simulate`. A file a case, by its name."""
+    """Reads the edges of running drums; for `dem_warp.simulate(on_advance=)`. A file a case, by its name."""
 
     folder: Path
     places: np.ndarray

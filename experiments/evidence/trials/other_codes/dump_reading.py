@@ -166,7 +166,7 @@ class FilmedLift(LiftController):
         AnswerError
             When the tube is not clear of the heap.
         """
-        elapsed = view.time - self.course.phase_start
+        elapsed = view.time - self.state.phase_start
         if not self.scene.lift_speed * elapsed > view.highest + self.reach:
             raise AnswerError("the film ends before the tube is clear of the heap")
         self._finish(view, elapsed)
@@ -196,11 +196,11 @@ def filmed_observables(
         view = watch.view(frame, forces[frame.step])
         decision = controller.look(view)
         if decision.failure or decision.done:
-            return dict(controller.course.observables), watch.kept(frame), decision.failure
+            return dict(controller.state.observables), watch.kept(frame), decision.failure
         if decision.remove is not None:
             watch.alive[decision.remove] = False
     controller.finish(view)
-    return dict(controller.course.observables), watch.kept(frame), ""
+    return dict(controller.state.observables), watch.kept(frame), ""
 
 
 class _Watch:

@@ -69,7 +69,7 @@ def test_a_turning_drum_is_watched(tmp_path):
     grains = GrainPopulation(ClumpShape.sphere(2e-3), Material(1500.0, 1e6, 0.3))
     case = Case(scene, grains, Interaction(0.3, 0.5, 0.05), Interaction(0.3, 0.5, 0.05), seed=1)
     watch = EdgeWatch(tmp_path, PLACES)
-    result = simulate([case], "cpu", onlooker=pickle.loads(pickle.dumps(watch)))[0]
+    result = simulate([case], "cpu", on_advance=pickle.loads(pickle.dumps(watch)))[0]
     assert result.status == "finished", result.reason
     edges = read_edges(tmp_path, case_name(case))
     # the looks of the controller come in steps of a power of two: half as often, or half as often again

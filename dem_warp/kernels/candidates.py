@@ -1,10 +1,8 @@
-"""Between two rebuilds: how fast a world is, whether its neighbour lists still hold, and what is near.
+"""Validity of the neighbour lists, and the candidates for contacts in the next steps.
 
-All is done for some steps ahead. From the speeds of a grain and of its neighbours, which may strike it,
-follows how far it may come in that time, so that only the entries of a list that are nearer than the paths of
-the two can touch: the step looks at these alone. Afterwards it is seen whether all kept to it; a world whose
-grains did not is flagged. Grains that wait high above all others, as most do when a rain begins, touch nobody
-and are left out.
+The speeds of a grain and of its neighbours limit its path in the next steps. Only the entries of a list that
+are nearer than the paths of the two can touch: the step uses these alone. Afterwards a world is flagged if a
+grain came farther. Grains that wait high above all others, as at the beginning of a rain, are left out.
 """
 
 import functools
@@ -21,43 +19,43 @@ from dem_warp.kernels.walls import wall_functions
 from dem_warp.types import Build, WorldFlag, device_structs
 
 LONGEST_CYCLE = 64
-"""Steps between two looks at the most."""
+"""Most steps between two checks."""
 
 HEADROOM = 4.0
-"""Speed that a grain is allowed to reach, over what it has: an impact makes a falling grain spin."""
+"""Allowed speed of a grain over its present speed: an impact makes a falling grain spin."""
 
 STRUCK = 2.0
-"""Speed that a grain is allowed to reach when it is struck, over that of its fastest neighbour."""
+"""Allowed speed of a grain after a collision over that of its fastest neighbour."""
 
 SHAKEN = 0.25
-"""The same over that of the fastest grain or wall of its world, which may strike it through others."""
+"""Allowed speed of a grain over that of the fastest grain or wall of its world."""
 
 EXPECTED = 1.5
-"""Speed that a grain is expected to reach, over what it has."""
+"""Expected speed of a grain over its present speed."""
 
 KEPT = 0.9
-"""Part of its speed at a look that a grain is taken to have at the next: one that rattles rests at times."""
+"""Least assumed speed of a grain over that at the last check, for grains that rattle."""
 
 LEAST_PATH = 0.025
-"""Part of the skin that is allowed for at the least: grains at rest may be set in motion."""
+"""Least allowed path over the skin: grains at rest may be set in motion."""
 
 JOINED = 0.25
-"""Part of the skin, up to one half, from which on a world joins a rebuild that another one calls for."""
+"""Used part of the skin (up to one half) above which a world joins another world's rebuild."""
 
 MOVED, MOVED_SERIAL = 0.1, 0.4
-"""Part of the skin, up to one half, from which on a grain is searched anew when another one of its world must
-be: on a GPU, where all are looked at anyway, and on a CPU."""
+"""Used part of the skin (up to one half) above which a grain joins the rebuild of another one, on a GPU and
+on a CPU."""
 
 CLEARANCE = 2.0
-"""Skins between a grain that waits and all that move freely, from which on it is left out of the lists: each
-of the two comes half a skin before the next look, and a skin is what lists are made for."""
+"""Distance of a waiting grain from all free grains, over the skin, above which it has no list: until the next
+check each of two moves at most half a skin, and lists reach one skin."""
 
 LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
 
 @functools.cache
-def watch_kernels(build: Build) -> SimpleNamespace:
-    """Kernels to launch before some steps, in this order, and `find_fastest` for after them."""
+def candidate_kernels(build: Build) -> SimpleNamespace:
+    """Return the kernels to launch before some steps, in this order, and `find_fastest` for after them."""
     precision = build.precision
     real = precision.real
     types = device_structs(precision)
@@ -70,12 +68,12 @@ def watch_kernels(build: Build) -> SimpleNamespace:
     walls_each = wp.constant(build.wall_count)
     lanes = wp.constant(WARP if build.cooperative else 1)
     moved = wp.constant(MOVED if build.cooperative else MOVED_SERIAL)
-    module = wp.get_module(f"dem_warp_watch_{build.name}")
+    module = wp.get_module(f"dem_warp_candidates_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
     @wp.func
     def speed_of(model: Model, grains: Grains, g: int) -> float:
-        """Of the fastest point of a grain [m/s]."""
+        """Return the speed of the fastest point of a grain [m/s]."""
         v = pack.load_vec4(grains.velocity, g)
         omega = pack.load_vec4(grains.spin, g)
         turning = wp.length(wp.vec3(float(omega[0]), float(omega[1]), float(omega[2])))
@@ -85,14 +83,14 @@ def watch_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def farthest(world: World, pace: float, ahead: int) -> real:
-        """Farthest that a grain comes in some steps, struck to reach a speed and falling besides [m]."""
+        """Return the longest path of a grain at a speed, and falling, in some steps [m]."""
         time = real(ahead) * world.time_step
         falling = real(HEADROOM) * wp.length(world.gravity) * time
         return wp.clamp((real(pace) + falling) * time, real(LEAST_PATH) * world.skin, real(0.5) * world.skin)
 
     @wp.func
     def wall_path(model: Model, world: World, grains: Grains, w: int, i: int, steps: int) -> real:
-        """Farthest that a wall may come in some steps [m]."""
+        """Return the longest path of a wall in some steps [m]."""
         index = w * walls_each + i
         time = wp.float64(steps) * wp.float64(world.time_step)
         frame = walls.frame_of(model, index, grains.step[w])
@@ -100,14 +98,14 @@ def watch_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def waits(model: Model, grains: Grains, w: int, g: int) -> bool:
-        """Tell whether a grain is released after the longest cycle that may come."""
+        """Return True if a grain is released after the longest cycle."""
         return model.release_step[g] > grains.step[w] + wp.static(LONGEST_CYCLE)
 
     @wp.func
     def waits_afar(
         model: Model, world: World, grains: Grains, neighbours: Neighbours, w: int, g: int
     ) -> bool:
-        """Tell whether a grain waits so high that none that moves freely meets it before the next look."""
+        """Return True if a grain waits so high that no free grain touches it before the next check."""
         lowest = float(grains.position[g][2]) - float(model.inertia[g][3])
         clearance = wp.static(CLEARANCE) * float(world.skin) + float(world.reach)
         return waits(model, grains, w, g) and lowest > neighbours.near.top[w] + clearance
@@ -116,7 +114,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
     def uses_up(
         model: Model, world: World, grains: Grains, neighbours: Neighbours, g: int, ahead: int, part: real
     ) -> bool:
-        """Tell whether a grain in the lists may come farther than a part of the skin within some steps."""
+        """Return True if the path of a listed grain may exceed a part of the skin within some steps."""
         speed = real(EXPECTED * neighbours.near.speed[g])
         path = wp.max(speed * real(ahead) * world.time_step, real(LEAST_PATH) * world.skin)
         return neighbours.near.afar[g] == 0 and neighbours.travel[g] + path > part * world.skin
@@ -136,7 +134,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         stale: wp.array(dtype=int),
         any_stale: wp.array(dtype=int),
     ):
-        """Sets the speeds, and marks a world in which a grain or a wall may use up its half of the skin."""
+        """Set the speeds, and mark a world in which a grain or a wall may use up half of the skin."""
         g = wp.tid()
         w = g // model.grain_count
         if idle[w] != 0:
@@ -160,7 +158,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         afar = waits_afar(model, world, grains, neighbours, w, g)
         neighbours.near.afar[g] = wp.where(afar, 1, 0)
         if afar:
-            neighbours.travel[g] = world.skin  # it is searched as soon as it needs a list
+            neighbours.travel[g] = world.skin  # it gets a list as soon as it needs one
         moves = uses_up(model, world, grains, neighbours, g, ahead, real(moved))
         neighbours.near.moves[g] = wp.where(moves, 1, 0)
         if alive[g] > 0 and uses_up(model, world, grains, neighbours, g, ahead, real(0.5)):
@@ -181,7 +179,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         # state out
         stale: wp.array(dtype=int),
     ):
-        """Marks the worlds that would soon be stale too: a rebuild of many is hardly longer than of one."""
+        """Mark the worlds that would soon be stale too: a rebuild of many takes about as long as of one."""
         g = wp.tid()
         w = g // model.grain_count
         if idle[w] == 0 and alive[g] > 0 and stale[w] == 0:
@@ -189,7 +187,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 stale[w] = SOME
 
     @wp.kernel(module=module, grid_stride=False)
-    def heed_neighbours(
+    def raise_pace(
         ahead: int,
         # model
         model: Model,
@@ -200,7 +198,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         # state in and out
         neighbours: Neighbours,
     ):
-        """Raises the pace of a grain for the neighbours that may strike it; a warp a grain on a GPU."""
+        """Raise the pace of a grain for neighbours that may hit it; a warp per grain on a GPU."""
         thread = wp.tid()
         g = thread // lanes
         lane = thread - g * lanes
@@ -210,11 +208,11 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         world = model.world[w]
         pace = float(STRUCK) * fastest[w]
         if real(pace) * real(ahead) * world.time_step <= real(LEAST_PATH) * world.skin:
-            # so slow a world that it hardly matters who strikes
+            # the world is too slow for the neighbours to matter
             if lane == 0:
                 neighbours.near.pace[g] = wp.max(neighbours.near.pace[g], pace)
             return
-        striker = float(0.0)
+        fastest_neighbour = float(0.0)
         for k in range(lane, neighbours.count[g], lanes):
             partner = neighbours.entry[g * neighbours.capacity + k] & mask
             speed = neighbours.near.wall_speed[w]
@@ -222,13 +220,13 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 j = w * model.grain_count + partner // spheres_each
                 speed = neighbours.near.speed[j]
                 if wp.static(not build.cooperative):
-                    # this list alone has the two of them
+                    # the pair is in this list only
                     struck = float(STRUCK) * neighbours.near.speed[g]
                     neighbours.near.pace[j] = wp.max(neighbours.near.pace[j], struck)
-            striker = wp.max(striker, speed)
-        striker = largest_of_warp(striker)
+            fastest_neighbour = wp.max(fastest_neighbour, speed)
+        fastest_neighbour = largest_of_warp(fastest_neighbour)
         if lane == 0:
-            neighbours.near.pace[g] = wp.max(neighbours.near.pace[g], float(STRUCK) * striker)
+            neighbours.near.pace[g] = wp.max(neighbours.near.pace[g], float(STRUCK) * fastest_neighbour)
 
     @wp.kernel(module=module, grid_stride=False)
     def select_near(
@@ -243,7 +241,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         neighbours: Neighbours,
         fastest: wp.array(dtype=float),
     ):
-        """Lists, in order, the entries that may touch in the next steps; a warp a grain on a GPU."""
+        """List, in order, the entries that may touch in the next steps; a warp per grain on a GPU."""
         thread = wp.tid()
         g = thread // lanes
         lane = thread - g * lanes
@@ -258,7 +256,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             count = 0
         first = g * neighbours.capacity
         if wp.static(not build.cooperative):
-            # a single thread reads items that follow each other, and finds them in its cache
+            # a single thread reads consecutive items from its cache
             if g % model.grain_count != 0:
                 first = neighbours.near.first[g - 1] + neighbours.near.count[g - 1]
             neighbours.near.first[g] = first
@@ -302,10 +300,10 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         fastest: wp.array(dtype=float),
         flags: wp.array(dtype=int),
     ):
-        """Speed of the fastest grain or wall of each world, and highest point of the grains that do not wait.
+        """Find each world's fastest grain or wall, and the highest point of its free grains.
 
-        `row` threads a world, whole warps on a GPU. Flags the worlds in which a grain came farther than its
-        lists allowed for.
+        It has `row` threads per world, whole warps on a GPU, and flags worlds in which a grain moved farther
+        than its lists allow.
         """
         thread = wp.tid()
         w = thread // row
@@ -340,7 +338,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
     return SimpleNamespace(
         mark_stale=mark_stale,
         join=join,
-        heed_neighbours=heed_neighbours,
+        raise_pace=raise_pace,
         select_near=select_near,
         find_fastest=find_fastest,
         module=module,
