@@ -232,7 +232,7 @@ def test_the_lowest_row_of_grains_is_no_plate(shade: float) -> None:
     angle = measure(on_a_row(tuple(round(shade * channel) for channel in GRAIN)))
     assert not angle.outline.plate.visible
     assert angle.doubts == ()
-    # Beside the heap 15 columns of the row, level, count among the 215 of a flank.
+    # Next to the heap 15 columns of the row, level, count among the 215 of a flank.
     assert angle.mean == pytest.approx(30.0, abs=0.7)
 
 

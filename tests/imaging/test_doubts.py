@@ -55,7 +55,7 @@ def test_a_foot_in_the_shade_ends_before_its_line_does(left: int, right: int, ex
 @pytest.mark.parametrize("missed", [0.35, 0.15])
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_foot_that_is_missed_leaves_a_cliff(missed: float, side: int) -> None:
-    # the foot is not told from the wall behind it, and the outline follows the plate's far edge
+    # the foot looks like the wall behind it, and the outline follows the plate's far edge
     whole = outline(0.0)
     height = whole.height.copy()
     reach = int(missed * len(height) / 2)

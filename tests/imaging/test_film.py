@@ -44,7 +44,7 @@ def test_walls_are_seen_through() -> None:
     sphere = ([[0.01, 0.0, 0.02]], [0.004], [0])
     wall = square(-0.02, 0.02, 0.01, 0.04)
     behind, clear = SCENERY.draw(*sphere, [wall], ""), SCENERY.draw(*sphere, [], "")
-    # Its rim, smoothed, is up to three pixels beside the edge.
+    # Its rim, smoothed, is up to three pixels from the edge.
     assert changed(behind) == pytest.approx((-0.02, 0.02, 0.01, 0.04), abs=3.5 * METERS_PER_PIXEL)
     row, column = round(GROUND - 0.02 / METERS_PER_PIXEL), round(200 + 0.01 / METERS_PER_PIXEL)
     seen, bare = behind[row, column].astype(float), clear[row, column].astype(float)

@@ -49,7 +49,7 @@ def in_hard_light(
     [(0.3, 0.2, (1,)), (0.6, 0.3, (-1,)), (0.3, 0.3, (1, -1)), (0.6, 0.2, (1, -1))],
 )
 def test_a_sharp_shadow_is_no_part_of_the_heap(keeps: float, aside: float, sides: tuple[int, ...]) -> None:
-    """As part of the heap on both sides, it makes the angle 4 degrees flatter at 0.2, and 6 at 0.3."""
+    """A shadow on both sides, as part of the heap, makes the angle 4 degrees flatter at 0.2, and 6 at 0.3."""
     angle = measure(in_hard_light(keeps, aside, sides))
     assert angle.doubts == ()
     # The promise for smooth heaps of 400 pixels.
@@ -73,7 +73,7 @@ def test_a_shadow_next_to_grains_of_the_walls_hue_is_doubted(keeps: float, aside
 
 @pytest.mark.parametrize("texture", [0.0, 0.15])
 def test_a_powder_of_the_walls_hue_is_no_shadow(texture: float) -> None:
-    """As even as a shadow, and darker than the wall: but its edge is as light as its middle."""
+    """The powder is as even as a shadow and darker than the wall, but its edge is as light as its middle."""
     angle = measure(in_hard_light(1.0, 0.0, color=COAL, grain=14.0 if texture else 0.0, texture=texture))
     assert angle.doubts == ()
     # Two standard errors of flanks of 14 grains.

@@ -85,9 +85,9 @@ def test_a_slope_beside_profiles_of_the_same_test_is_told(
     )
     file(tmp_path, "".join(rows))
     slope = '[[response]]\nobservable = "dynamic_angle"\nmean = "30 deg"\nsd = "1 deg"\nn = 5\n'
-    alone, beside = (load_study(write_study((TUBE, DRUM), (ANGLE, TARGET), add=add)) for add in ("", slope))
+    alone, both = (load_study(write_study((TUBE, DRUM), (ANGLE, TARGET), add=add)) for add in ("", slope))
     assert with_measurements(alone)[1] == ()
-    assert with_measurements(beside)[1] == (
+    assert with_measurements(both)[1] == (
         "dynamic_angle counts twice if it was read from the profiles of the same test",
     )
 

@@ -133,8 +133,8 @@ def test_a_picture_of_two_replicates_is_refused_with_both_places(read, tmp_path:
     save_picture(tmp_path / "heap.png", draw(DrawnHeap(27.0, 31.0), PLAIN))
     (tmp_path / "copy.png").write_bytes((tmp_path / "heap.png").read_bytes())
     for name in ("heap.png", "copy.png"):
-        told = rf"csv:3: picture: {name} is a copy of heap.png \(.*measured.csv:2: picture\)"
-        with pytest.raises(InputError, match=told):
+        message = rf"csv:3: picture: {name} is a copy of heap.png \(.*measured.csv:2: picture\)"
+        with pytest.raises(InputError, match=message):
             read(f"base,1,,,,heap.png,0.1 mm\nbase,2,,,,{name},0.1 mm\n")
     # Another view of the same heap, or a row for each observable, is no repeat.
     data = read("base,1,flank_angle,,,heap.png,\nbase,1,concavity,,,copy.png,\n")

@@ -53,7 +53,7 @@ def from_source(write_study: WriteStudy) -> Callable[..., Study]:
 
 @pytest.fixture
 def photographs(tmp_path: Path) -> list[Path]:
-    """Three drawn heaps in a folder beside the study."""
+    """Three drawn heaps in a folder next to the study."""
     (tmp_path / "photos").mkdir()
     paths = [tmp_path / "photos" / f"heap-{number}.png" for number in range(3)]
     for path, slope in zip(paths, (27.0, 29.0, 31.0), strict=True):
@@ -122,10 +122,10 @@ def test_a_copy_of_a_photograph_is_refused_with_both_before_anything_is_measured
 ) -> None:
     photographs[2].write_bytes(photographs[0].read_bytes())
     study = from_source('pictures = "photos"')
-    told = r"target.pictures: picture 3: .*heap-2.png is a copy of .*heap-0.png"
-    with pytest.raises(InputError, match=told):
+    message = r"target.pictures: picture 3: .*heap-2.png is a copy of .*heap-0.png"
+    with pytest.raises(InputError, match=message):
         check_runs(study)
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=message):
         check_calibration_file(study.file)
 
 
@@ -175,7 +175,7 @@ def test_the_observable_that_a_target_asks_its_file_for_leads(
 
 
 @pytest.mark.parametrize(
-    ("asked", "told"),
+    ("asked", "message"),
     [
         ('observable = "height"', r"two different values .* height shows no scatter.*, got height \("),
         ('observable = "r90"', r"measured.csv has angle \(base\), t75 \(base\), angle \(fast\), "),
@@ -184,10 +184,10 @@ def test_the_observable_that_a_target_asks_its_file_for_leads(
     ],
 )
 def test_an_observable_that_the_file_does_not_have_is_refused(
-    from_source, tmp_path: Path, asked: str, told: str
+    from_source, tmp_path: Path, asked: str, message: str
 ) -> None:
     (tmp_path / "measured.csv").write_text(MEASURED, encoding="utf-8")
-    with pytest.raises(InputError, match=told) as error:
+    with pytest.raises(InputError, match=message) as error:
         with_measurements(from_source(f'{asked}\nfile = "measured.csv"', CONDITIONS))
     assert error.value.place.endswith("target.observable")
 
