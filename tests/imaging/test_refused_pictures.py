@@ -14,6 +14,7 @@ from imaging import (
     measure_photograph,
     read_picture,
     save_picture,
+    snapshot,
 )
 
 SCENE = Camera(
@@ -111,6 +112,7 @@ def test_every_named_fit_measures_a_straight_flank() -> None:
         lambda: FitSettings("too high", 0.0, 1.2),
         lambda: FitSettings("toe", 0.0, 1.0, toe=-1.0),
         lambda: FitSettings.of("whole"),
+        lambda: snapshot([[0.0, 0.0, 1.0]], [1.0], backend="opengl"),
         lambda: heap_angle([[0.0, 0.0, 1.0]], [1.0], azimuths=1),
         lambda: measure(draw(DrawnHeap(30, 30))).interval(1.5),
     ],

@@ -153,11 +153,6 @@ def test_bad_spheres_are_named(centers, radii, words: str) -> None:
         silhouette(centers, radii)
 
 
-def test_unknown_backend_is_named(heap) -> None:
-    with pytest.raises(PictureError, match=r"backend.*'opengl'"):
-        snapshot(heap.centers, heap.radii, backend="opengl")
-
-
 def test_plate_is_found_next_to_stray_grains(heap, tmp_path) -> None:
     strays = np.array([[-0.045, 0.0, 0.001], [0.046, 0.0, 0.001]])
     centers, radii = np.vstack([heap.centers, strays]), np.r_[heap.radii, 0.001, 0.001]

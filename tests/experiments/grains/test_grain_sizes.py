@@ -59,9 +59,7 @@ def test_moments_are_those_of_a_sample(name: str) -> None:
         assert moment == pytest.approx(own.mean(), abs=5.0 * own.std() / np.sqrt(draws))
 
 
-@pytest.mark.parametrize(
-    ("basis", "cut"), [("number", (0.01, 0.99)), ("number", (0.05, 0.9)), ("volume", (0.05, 0.9))]
-)
+@pytest.mark.parametrize(("basis", "cut"), [("number", (0.05, 0.9)), ("volume", (0.05, 0.9))])
 def test_the_mass_beyond_the_cuts_is_counted(basis: str, cut: tuple[float, float]) -> None:
     law = LAWS["lognormal"]
     lost = cut_classes(Continuous(law), basis, cut, 10).mass_lost
@@ -164,7 +162,6 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
         ),
         ("opening,retained\n1,-3\n2,4\n", "mm", r"sizes.csv:2: retained: must be 0 or more, got -3"),
         ("opening,retained\n1,x\n2,4\n", "mm", r"sizes.csv:2: retained: must be a number"),
-        ("opening,retained\n1,3 mm\n2,4\n", "mm", r"sizes.csv:2: retained: needs a unit of mass"),
         ("opening,retained\n1,0\n2,4\n", "mm", r"sizes.csv: retained: must have mass between two sieves"),
         ("opening,retained\n1,3\n", "mm", r"sizes.csv: needs 2 rows or more .*got 1"),
         ("opening\n1\n2\n", "mm", r"sizes.csv: needs one column of retained, .*got none"),
@@ -183,7 +180,6 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
             "mm",
             r"sizes.csv:4: passing_percent: must be percent, .*not parts of 1, got 1",
         ),
-        ("openning,retained\n1,3\n", "mm", r"missing: opening"),
     ],
 )
 def test_a_bad_sieve_analysis_is_refused_with_its_row(
@@ -197,11 +193,9 @@ def test_a_bad_sieve_analysis_is_refused_with_its_row(
     ("text", "message"),
     [
         ("diameter\n-1\n", r"sizes.csv:2: diameter: must be positive, got -1"),
-        ("diameter,count\n1,-2\n", r"sizes.csv:2: count: must be 0 or more"),
         ("diameter,count\n1,0\n", r"sizes.csv: count: must count at least one grain"),
         ("from,to,count\n1,0.5,3\n", r"sizes.csv:2: to: must be above from, 1, got 0.5"),
         ("from,to,count\n1,2,3\n1.5,3,4\n", r"sizes.csv:3: from: must not be below .*got 1.5"),
-        ("from,count\n1,2\n", r"needs a column diameter, or from, to and count; missing: to"),
         ("diameter,from,to,count\n1,1,2,3\n", r"sizes.csv: must have a column diameter, or .*not both"),
     ],
 )
@@ -314,12 +308,10 @@ high = "4 mm"
         ("geometric_sd = 1.2", "", "a lognormal distribution needs geometric_sd"),
         ("geometric_sd = 1.2", "geometric_sd = 0.9", "geometric_sd: must be greater than 1"),
         ("geometric_sd = 1.2", 'geometric_sd = 1.2\nsd = "1 mm"', "distribution must not have sd"),
-        ('median = "3.6 mm"', "median = 3.6", "median: needs a unit of length"),
         ('distribution = "lognormal"', 'distribution = "log"', "distribution: must be 'normal', 'lognormal'"),
         ('distribution = "lognormal"', 'counts = "none.csv"', "no such file"),
         ("[grain.sizes]", "size_sd = 0.1\n[grain.sizes]", "must have sizes .* or size_sd, not both"),
         ('by = "volume"', 'by = "volume"\ncut = [0.9, 0.1]', "cut must rise, got 0.9 and 0.1"),
-        ('by = "volume"', 'by = "volume"\nunit = "in"', "unit: needs a unit of length"),
         ('by = "volume"', 'by = "volume"\nclasses = 0', "classes: must be greater than or equal to 1"),
     ],
 )

@@ -93,6 +93,9 @@ def test_a_slope_beside_profiles_of_the_same_test_is_told(
 
 
 def test_profiles_of_another_test_or_observable_are_refused(write_study: Callable[..., Path]) -> None:
+    bare = load_study(write_study((ANGLE, '[target]\nobservable = "outline"\n')))
+    with pytest.raises(InputError, match=r'"outline" needs profiles, a file of them, or a twin'):
+        with_profiles(bare)
     heap = load_study(write_study((ANGLE, TARGET)))
     with pytest.raises(InputError, match=r'the "surface" of a drum .*, got surface of lifted-cylinder'):
         with_profiles(heap)

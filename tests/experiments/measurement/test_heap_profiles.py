@@ -11,7 +11,7 @@ import pytest
 from drawn_heaps import Camera, DrawnHeap, draw
 
 from dem_warp import CaseResult
-from experiments.io.errors import InputError, StudyError
+from experiments.io.errors import InputError
 from experiments.measurement.case_observables import measure, observe
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.profile_files import read_heap_profiles
@@ -194,14 +194,6 @@ def test_a_doubtful_outline_is_refused_with_the_doubt(tmp_path: Path) -> None:
     row = file(tmp_path, "1,lean.png,0.1 mm\n", "replicate,picture,pixel")
     with pytest.raises(InputError, match=r"p.csv:2: picture: is doubtful: .*left"):
         read_heap_profiles(row, "flank", SIZE)
-
-
-def test_an_outline_needs_profiles_or_a_twin(write_study: Callable[..., Path], tmp_path: Path) -> None:
-    study = load_study(write_study((ANGLE, '[target]\nobservable = "outline"\n')))
-    with pytest.raises(InputError, match=r'"outline" needs profiles, a file of them, or a twin'):
-        with_profiles(study)
-    with pytest.raises(StudyError, match="with_measurements must first"):
-        _ = load_study(write_study((ANGLE, TARGET))).target
 
 
 def test_a_measured_file_has_outlines_where_the_study_asks(

@@ -11,7 +11,6 @@ import pytest
 from drawn_heaps import Camera, DrawnHeap, draw
 from typer.testing import CliRunner
 
-import imaging
 from doe.discrepancy import Measured
 from experiments.cli import app
 from experiments.io.errors import InputError
@@ -83,11 +82,6 @@ def test_rows_become_heaps_in_the_order_of_the_study_with_units_converted(read) 
     np.testing.assert_array_equal(data.values["fast"], [[nan, 0.012, -0.02, nan, nan]])
 
 
-def test_columns_may_be_few_and_in_any_order(read) -> None:
-    data = read("25.5,flank_angle,base,1\n", header="\ufeffvalue,observable,condition,replicate\n")
-    np.testing.assert_array_equal(data.values["base"], [[25.5]])
-
-
 def test_a_clogged_tube_is_an_outcome(read) -> None:
     data = read(angles("base", 24.0, 26.0) + "base,3,clogged,,,,\n")
     assert data.reasons["base"] == ("", "", CLOGGED)
@@ -114,19 +108,6 @@ def test_pictures_are_measured_as_heaps_are(read, tmp_path: Path) -> None:
     width = DrawnHeap(27.0, 31.0).width * 0.1e-3
     assert base["r50"] == pytest.approx(width / 4.0, rel=0.03)
     assert data.pictures["base"] == (tmp_path / "heap.png", tmp_path / "turned.png")
-
-
-def test_a_picture_is_read_once(read, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    save_picture(tmp_path / "heap.png", draw(DrawnHeap(27.0, 31.0), PLAIN))
-    looks, find = [], imaging.find_outline
-
-    def note(*arguments: object, **options: object) -> imaging.Outline:
-        looks.append(options["meters_per_pixel"])
-        return find(*arguments, **options)
-
-    monkeypatch.setattr(imaging, "find_outline", note)
-    read("".join(f"base,1,{name},,,heap.png,0.1 mm\n" for name in NAMES[:5]) + "fast,1,,,,heap.png,\n")
-    assert looks == [pytest.approx(1e-4), None]
 
 
 def test_a_picture_of_two_replicates_is_refused_with_both_places(read, tmp_path: Path) -> None:
@@ -209,11 +190,6 @@ def test_one_note_names_all_values_of_one_wrong_unit(read) -> None:
     assert noted(data, "rows 3, 4, 5 and 2 more: height must be between", ", got 12 m, ...; ignored")
     # A heap of which nothing is left is none.
     np.testing.assert_array_equal(data.values["base"], [[25.0]])
-
-
-def test_a_unit_of_the_right_kind_is_converted(read) -> None:
-    data = read("base,1,flank_angle,0.45,rad\n")
-    np.testing.assert_allclose(data.values["base"], [[np.degrees(0.45)]], rtol=1e-15)
 
 
 def test_wrong_units_that_leave_no_value_are_refused(read) -> None:

@@ -151,11 +151,6 @@ def dump_with(line: str, replacement: str) -> str:
             "finite",
             "line 10",
         ),
-        (
-            dump_with("169 1 0.410705 0.0295139 0.0923283 0.002", "169 1 0.410705 0.0295139 0.0923283 -1"),
-            "r > 0",
-            "line 10",
-        ),
         ("#format jointedPM\n1 2 3\n", "a format of Yade with spheres", "line 1"),
         ("x,y,z,weight\n1,2,3,4\n", "columns x, y, z and radius", "line 1"),
         ("# vtk DataFile Version 3.0\nnonsense\nASCII\n", "VTK file", "heap"),
