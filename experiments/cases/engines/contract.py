@@ -292,8 +292,7 @@ def read_heap(path: Path) -> tuple[np.ndarray, np.ndarray]:
     try:
         found = read_spheres(path)
     except InputError as error:
-        place = error.place.replace(str(path), path.name)
-        raise AnswerError(f"{place}: {error.problem}, got {_shown(error.value)}") from error
+        raise AnswerError(str(error).replace(str(path), path.name)) from error
     bodies = np.arange(len(found.spheres)) if found.bodies is None else found.bodies
     return found.spheres * (found.unit or 1.0), np.unique(bodies, return_inverse=True)[1].ravel()
 

@@ -101,11 +101,11 @@ def test_spheres_of_a_grain_belong_together(tmp_path: Path) -> None:
     ("text", "rule"),
     [
         ("", "heap.csv: not a file of spheres"),
-        ("x,y,z,r\n", "needs at least one sphere"),
+        ("x,y,z,r\n", "has no spheres"),
         ("x,y,z\n1,2,3\n", "not a file of spheres"),
-        ("x,y,z,r\n1,2,3\n", "line 2: a sphere is x y z r"),
-        ("x,y,z,r\n1,2,3,0.1\n1,2,3,-1\n", "line 3: a sphere is x y z r: four finite numbers, r > 0"),
-        ("x,y,z,r\n1,2,inf,0.1\n", "line 2: a sphere is x y z r"),
+        ("x,y,z,r\n1,2,3\n", "line 2: a sphere must be x y z r"),
+        ("x,y,z,r\n1,2,3,0.1\n1,2,3,-1\n", "line 3: a sphere must be x y z r: four finite numbers, r > 0"),
+        ("x,y,z,r\n1,2,inf,0.1\n", "line 2: a sphere must be x y z r"),
     ],
 )
 def test_a_malformed_heap_is_named_by_its_line(tmp_path: Path, text: str, rule: str) -> None:
@@ -137,8 +137,8 @@ def test_several_cases_run_at_once_and_come_back_in_order(small_study: Study, tm
     [
         ("crash", NO_ANSWER, "the exit code 1; its last words: no license was found"),
         ("silent", NO_ANSWER, "the program wrote no result.json"),
-        ("nan", NO_ANSWER, "heap.csv, line 2: a sphere is x y z r"),
-        ("words", NO_ANSWER, "heap.csv, line 2: a sphere is x y z r"),
+        ("nan", NO_ANSWER, "heap.csv, line 2: a sphere must be x y z r"),
+        ("words", NO_ANSWER, "heap.csv, line 2: a sphere must be x y z r"),
         ("columns", NO_ANSWER, "heap.csv: not a file of spheres"),
         (
             "status",
