@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
@@ -33,6 +33,8 @@ class CodeTest:
     """Words of the code for each law."""
     rows: tuple[Translated, ...]
     """Rows of the README about the laws."""
+    notes: tuple[Translated, ...]
+    """Rows of the README about forms of the code's own."""
     warnings: tuple[str, ...]
     """Laws and mechanisms that the code lacks."""
 
@@ -63,7 +65,7 @@ def code_exporter(
         return tuple(_terms(table["contact"], contact, numbers(contact), source))
 
     def translated(test: ExportedTest) -> Translation:
-        return translate(_code_test(exporter, laws, test))
+        return translate(_code_test(exporter, laws, test, table.get("notes", ())))
 
     exporter = Exporter(
         code,
@@ -96,7 +98,9 @@ def _terms(
             yield Term(name, value, row.get("unit", "1"), row["formula"], row.get("source", source))
 
 
-def _code_test(exporter: Exporter, laws: LawsOfCode, test: ExportedTest) -> CodeTest:
+def _code_test(
+    exporter: Exporter, laws: LawsOfCode, test: ExportedTest, notes: Sequence[Mapping[str, str]]
+) -> CodeTest:
     lift, own = Lift(test), test.case.laws
     case = replace(lift.case, mechanisms=(), laws=laws.nearest_laws(own))
     heaviest = max(template.mass for template in lift.templates)
@@ -105,5 +109,12 @@ def _code_test(exporter: Exporter, laws: LawsOfCode, test: ExportedTest) -> Code
     surface = replace(tube.surface, static_friction=coefficients.static_friction)
     plate = replace(tube, surface=surface, coefficients=coefficients)
     warnings = laws.warnings(own) + mechanism_warnings(test.case, exporter.code)
-    rows = tuple(laws.translated(own))
-    return CodeTest(lift, exporter, (among, tube, plate), laws.words(own), rows, warnings)
+    return CodeTest(
+        lift,
+        exporter,
+        (among, tube, plate),
+        laws.words(own),
+        tuple(laws.translated(own)),
+        tuple(Translated(**note) for note in notes),
+        warnings,
+    )

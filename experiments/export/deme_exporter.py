@@ -8,32 +8,12 @@ import numpy as np
 
 from experiments.export.code_table import CodeTest, code_exporter
 from experiments.export.exporter import Translation
-from experiments.export.laws import Translated
 from experiments.export.lift import SIDES, disc
 from experiments.export.same_rain import SCRIPT, program_translation, world_of
 
 THICKNESS = 1.1
 """Thickness of the tube's wall, in radii of the largest sphere: triangles are felt from one side, up to a
 radius behind them, so that a thinner wall would pull grains through."""
-
-_ROWS = (
-    Translated(
-        "clumps", "rigid, mass properties of the union of the spheres", "the same, one template a grain"
-    ),
-    Translated(
-        "tube's wall",
-        "of no thickness",
-        f"{THICKNESS:g} radii of the largest sphere thick, outside the tube: triangles have one side",
-    ),
-    Translated(
-        "integration", "velocities, then places", "the same: `centered_difference`; velocities in float32"
-    ),
-    Translated(
-        "start",
-        "",
-        "compiles for a minute or more; a file named by `DEME_PERSISTENT_JITIFY_CACHE` shortens later starts",
-    ),
-)
 
 
 def translate(test: CodeTest) -> Translation:
@@ -54,17 +34,11 @@ def translate(test: CodeTest) -> Translation:
     walls = {"tube.obj": obj_text(tube)}
     if scene.plate_diameter is not None:
         walls["plate.obj"] = obj_text(disc(scene.plate_diameter / 2))
-    return program_translation(test, world, "deme", ("python3", SCRIPT), numbers, _ROWS, walls)
+    return program_translation(test, world, "deme", ("python3", SCRIPT), numbers, walls)
 
 
 def thick_tube(radius: float, height: float, thickness: float, sides: int = SIDES) -> np.ndarray:
-    """Triangles of a tube with a wall, its inner sides touching a cylinder from outside [m].
-
-    Returns
-    -------
-    numpy.ndarray
-        Corners, (8 sides, 3, 3), counter-clockwise as seen from where grains are.
-    """
+    """Return the triangles of a tube with a wall around a cylinder, facing grains [m], (8 sides, 3, 3)."""
     turns = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     corner = radius / np.cos(np.pi / sides)
     ring = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(sides)])

@@ -77,11 +77,6 @@ def contact_numbers(contact: Contact) -> dict[str, float]:
 
     Poisson's ratio is put in as 0. From E and v LAMMPS makes E* = E / 2 (1 - v^2), of walls
     E / 2 (1 - v) in some versions; without v both are E / 2.
-
-    Raises
-    ------
-    ValueError
-        If LAMMPS' polynomial does not reach the damping, see `tsuji_restitution`.
     """
     law = contact.coefficients
     spring = 8.0 * law.shear_modulus
@@ -127,7 +122,8 @@ def translate(test: CodeTest) -> Translation:
         for row in lift_rows(lift, exact_tube=True)
     )
     warnings = test.warnings + lift_warnings(lift) + tilted
-    translated = (*test.rows, *rows, *_rows(lift))
+    bodies = "`fix nve/sphere`" if lift.is_of_spheres else "`fix rigid/small`, mass and inertia given"
+    translated = (*test.rows, *rows, Translated("grains", "clumps, rigid", bodies), *test.notes)
     return Translation(files, INPUT, ("lmp", "-in", INPUT), HEAP_FILE, translated, warnings)
 
 
@@ -208,18 +204,18 @@ def _gravity(lift: Lift) -> float:
 
 
 def _fall_time(lift: Lift) -> float:
-    """Time between two insertions [s]: that in which a grain falls through the space of the rain."""
+    # an insertion follows when the last one has fallen through the space of the rain
     speed, gravity = lift.scene.rain_speed, _gravity(lift)
     return (math.sqrt(speed**2 + 2.0 * gravity * lift.rain_height) - speed) / gravity
 
 
 def grains_at_once(lift: Lift) -> int:
-    """Grains that LAMMPS puts in at once: whole ones, so that its rate is the asked one or less."""
+    """Return the number of grains that LAMMPS puts in at once: its rate is the wanted one or less."""
     return max(math.floor(lift.rain_rate * _fall_time(lift)), 1)
 
 
 def _volume_fraction(lift: Lift) -> float:
-    """Volume fraction from which LAMMPS comes to as many grains an insertion as the rate asks for."""
+    # LAMMPS makes the number of grains of an insertion from it
     area = math.pi * (lift.rain_radius - lift.reach) ** 2
     if lift.is_of_spheres:
         one = sum(t.fraction * 4.0 / 3.0 * math.pi * t.radii[0] ** 3 for t in lift.templates)
@@ -229,7 +225,7 @@ def _volume_fraction(lift: Lift) -> float:
 
 
 def _molecule_radius(template: Template) -> float:
-    """Radius of a molecule as LAMMPS has it [m]: about the mean of the spheres' centres."""
+    # LAMMPS has it about the mean of the spheres' centres
     away = template.centers - template.centers.mean(axis=0)
     return float(((away**2).sum(axis=1) ** 0.5 + template.radii).max())
 
@@ -250,19 +246,6 @@ def _lifting(lift: Lift) -> str:
     loop = clear_loop(lift.steps(LOOK), looks, lift.largest_radius)
     lifting = _LIFT.format(step_rise=lift.case.time_step * scene.lift_speed, loop=loop)
     return lifting + rest_loop(lift, "rest", text.QUIT) + _END
-
-
-def _rows(lift: Lift) -> tuple[Translated, ...]:
-    """Return rows of the README on forms of LAMMPS' own."""
-    bodies = "`fix nve/sphere`" if lift.is_of_spheres else "`fix rigid/small`, mass and inertia given"
-    return (
-        Translated("grains", "clumps, rigid", bodies),
-        Translated(
-            "radius of contacts with the tube",
-            "that of the sphere",
-            "LAMMPS counts half the tube's curvature in: contacts are stiffer by r / 4 R or so",
-        ),
-    )
 
 
 def tsuji_restitution(damping: float) -> float:

@@ -16,18 +16,16 @@ from experiments.export.sizes import classes_of
 from experiments.io.errors import InputError
 
 FIRST_SEED = 10_000
-"""LIGGGHTS wants primes above it."""
+"""Number that LIGGGHTS' seeds, which are primes, exceed."""
 
 RAIN_DENSITY = 0.12
-"""Largest solid fraction of the rain: in a denser one not all grains find a place at random, and codes that
-place the largest first then leave out small ones."""
+"""Largest solid fraction of the rain: in a denser one not all grains find a place at random."""
 
 RAIN_HEIGHT = 3.0
-"""Height of the space that the rain is put in, in diameters of the largest grain."""
+"""Height of the space of the rain [diameters of the largest grain]."""
 
 SIDES = 60
-"""Sides of the prism that stands for the tube; it touches the cylinder from outside, and its edges stand out
-of it by 0.14 % of the radius."""
+"""Sides of the prism around the tube; its edges are 0.14 % of the radius outside the cylinder."""
 
 LOOK = 5e-3
 """Time between two looks at the grains [s]."""
@@ -185,10 +183,7 @@ class Lift:
 
     @property
     def strike(self) -> float:
-        """Height above which spheres' centres are struck off with their grains [m].
-
-        Codes strike off by spheres, not by grains: as many are struck off this way, in the mean.
-        """
+        """Height above which spheres are struck off with their grains [m], in the mean as many as grains."""
         return self.scene.height + self.rise_of_spheres
 
     @cached_property

@@ -13,7 +13,6 @@ from dem_warp.model import WorldSetup
 from experiments.export.code_table import CodeTest, code_exporter
 from experiments.export.contact import Contact
 from experiments.export.exporter import Translation
-from experiments.export.laws import Translated
 from experiments.export.lift import disc, prism
 from experiments.export.same_rain import (
     phases,
@@ -34,22 +33,6 @@ _CONTACT = """struct Contact
     double modulus, dissipation, shearModulus, slidingDissipation, slidingFriction, rollingFriction;
 };"""
 
-_ROWS = (
-    Translated(
-        "this driver",
-        "",
-        "written for MercuryDPM 1.0.0 alpha of July 2024; no run there is on record. Put this folder "
-        "next to `Drivers/Clump/ClumpHeaders`, and build lift.cpp as the drivers there are",
-    ),
-    Translated(
-        "clumps",
-        "rigid, mass properties of the union of the spheres",
-        "`ClumpParticle` of `Drivers/Clump/ClumpHeaders`, mass and moments given; contacts take the mass",
-    ),
-    Translated("edges of the tube's triangles", "none", "joined by the build's `TRIANGLE_WALL_CORRECTION`"),
-    Translated("integration", "velocities, then places", "velocity Verlet"),
-)
-
 
 def contact_numbers(contact: Contact) -> dict[str, float]:
     """Calculate the terms that are no coefficients of ours."""
@@ -69,7 +52,7 @@ def translate(test: CodeTest) -> Translation:
         walls["plate.csv"] = disc(scene.plate_diameter / 2)
     texts = {SOURCE: template("mercury"), HEADER: _header(test, world)}
     files = texts | same_rain_files(world) | {name: _table(sides) for name, sides in walls.items()}
-    return same_rain_translation(test, files, SOURCE, ("./lift",), _ROWS, comment="//")
+    return same_rain_translation(test, files, SOURCE, ("./lift",), comment="//")
 
 
 def _header(test: CodeTest, world: WorldSetup) -> str:

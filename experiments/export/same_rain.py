@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -28,7 +28,7 @@ gravity and contacts, its centre then [m], and its orientation."""
 
 
 def world_of(lift: Lift) -> WorldSetup:
-    """World of a case before its first step."""
+    """Prepare the world of a case."""
     # a wrong study is answered before the simulator is loaded
     from dem_warp.device import resolve_device
 
@@ -62,7 +62,7 @@ def _spheres(shape: Any) -> np.ndarray:
 
 
 def test_numbers(lift: Lift, world: WorldSetup) -> dict[str, Any]:
-    """All numbers of the test but those of contacts and walls, in SI units."""
+    """Return the numbers of the test but those of contacts and walls, in SI units."""
     density = lift.case.grain_material.density
     return {
         "time_step": world.time_step,
@@ -77,7 +77,7 @@ def test_numbers(lift: Lift, world: WorldSetup) -> dict[str, Any]:
 
 
 def phases(lift: Lift, world: WorldSetup) -> dict[str, Any]:
-    """Numbers that lead through the phases of the test."""
+    """Return the numbers of the phases of the test."""
     scene, release = lift.scene, world.grains.release_steps.max() * world.time_step
     return {
         "look": LOOK,
@@ -112,13 +112,11 @@ def program_translation(
     solver: str,
     command: tuple[str, ...],
     numbers: Mapping[str, Any],
-    rows: Sequence[Translated],
     walls: Mapping[str, str] | None = None,
 ) -> Translation:
     """Write a Python program: its head, the course of the test and the template of a solver, with its files.
 
-    `numbers` are those that it reads besides the test's, `rows` belong to the README, `walls` are texts of
-    further files.
+    `numbers` are those that it reads besides the test's, `walls` are texts of further files.
     """
     reads = f"Reads {TEST_FILE}, {RAIN_FILE} and the clumps; writes {HEAP}."
     about = f'"""Lifted cylinder in {test.exporter.code}. {reads}"""\n'
@@ -128,7 +126,7 @@ def program_translation(
         **same_rain_files(world),
         **(walls or {}),
     }
-    return same_rain_translation(test, files, SCRIPT, command, rows)
+    return same_rain_translation(test, files, SCRIPT, command)
 
 
 def same_rain_translation(
@@ -136,7 +134,6 @@ def same_rain_translation(
     files: Mapping[str, str],
     main: str,
     command: tuple[str, ...],
-    rows: Sequence[Translated],
     comment: str = "#",
 ) -> Translation:
     """Return the translation of a test whose program places every grain as it is placed here."""
@@ -145,7 +142,7 @@ def same_rain_translation(
         main=main,
         command=command,
         heap=HEAP,
-        translated=(*same_rain_rows(test.lift), *test.rows, *rows),
+        translated=(*same_rain_rows(test.lift), *test.rows, *test.notes),
         warnings=test.warnings + lift_warnings(test.lift, ends_in_time=True),
         comment=comment,
     )
@@ -153,12 +150,12 @@ def same_rain_translation(
 
 @cache
 def template(name: str) -> str:
-    """Text of a part of a program."""
+    """Return the text of a part of a program."""
     return (files("experiments.export") / "templates" / f"{name}.txt").read_text(encoding="utf-8")
 
 
 def same_rain_rows(lift: Lift) -> list[Translated]:
-    """Rows of the README on the test, with what a program has as it is here and other inputs have not."""
+    """Return rows of the README on the test, with what only a program has as it is here."""
     scene, grains = lift.scene, lift.case.grains
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
     filling = f"{filled}; {scene.rain_rate:g} grains a second, {scene.rain_speed:g} m/s"

@@ -7,31 +7,8 @@ import math
 from experiments.export.code_table import CodeTest, code_exporter
 from experiments.export.contact import Contact
 from experiments.export.exporter import Translation
-from experiments.export.laws import Translated
 from experiments.export.lift import disc, prism
 from experiments.export.same_rain import SCRIPT, program_translation, world_of
-
-_ROWS = (
-    Translated(
-        "clumps",
-        "rigid, mass properties of the union of the spheres",
-        "`appendClumped` of spheres without a mass and a member without a surface that has mass and moments; "
-        "both are checked. The spheres' own `state.mass` is the grain's: the damping takes it from there",
-    ),
-    Translated(
-        "edges of the tube's facets",
-        "none",
-        "a sphere over an edge touches both facets at once; they share its stiffness and damping",
-    ),
-    Translated(
-        "limit of rolling",
-        "mu_r R*",
-        "the same, set contact by contact; among unequal spheres that of equal ones in the first 20 steps",
-    ),
-    Translated("endless plate", "plane", "one triangle, far larger than the heap"),
-    Translated("numerical damping", "none", "none: `NewtonIntegrator(damping=0)`, whose default is 0.2"),
-    Translated("rotation into shear", "at the contact point", "the same: `avoidGranularRatcheting=False`"),
-)
 
 
 def translate(test: CodeTest) -> Translation:
@@ -44,7 +21,7 @@ def translate(test: CodeTest) -> Translation:
         "tube": prism(scene.diameter / 2, scene.height).tolist(),
         "plate": None if scene.plate_diameter is None else disc(scene.plate_diameter / 2).tolist(),
     }
-    return program_translation(test, world, "yade", ("yade", "-n", "-x", "-j1", SCRIPT), numbers, _ROWS)
+    return program_translation(test, world, "yade", ("yade", "-n", "-x", "-j1", SCRIPT), numbers)
 
 
 def contact_numbers(contact: Contact) -> dict[str, float]:
