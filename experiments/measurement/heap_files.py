@@ -68,15 +68,7 @@ def is_heap_file(path: Path) -> bool:
 
 
 def measure_heap_file(path: Path, fit: str, settings: HeapSettings) -> MeasuredHeap:
-    """Measure the repose angle of the heap in a file of spheres.
-
-    Raises
-    ------
-    InputError
-        When the file is invalid.
-    imaging.PictureError
-        When it has no measurable heap.
-    """
+    """Measure the repose angle of the heap in a file of spheres; raise `PictureError` without a heap."""
     file = read_spheres(path)
     if settings.unit is not None and file.unit is not None and settings.unit != file.unit:
         problem = f"must be the unit of the file, {file.unit:g} m"

@@ -262,13 +262,12 @@ def target_sample(rows: Sequence[Mapping[str, Any]], options: PictureOptions, pl
 
 def left_out_notes(rows: Sequence[Mapping[str, Any]], options: PictureOptions) -> tuple[str, ...]:
     """Name the pictures that do not count, with their reasons."""
-    failed = [f"{row['reason']}; it is left out" for row in rows if row["mean"] is None]
-    doubtful = [
-        f"{Path(row['picture']).name} is doubtful, and left out: {'; '.join(row['doubts'])}"
-        for row in rows
-        if row["mean"] is not None and row["doubts"] and not options.keep_doubtful
-    ]
-    return (*doubtful, *failed)
+    used = used_rows(rows, options)
+    left_out = [row for row in rows if row not in used]
+    return tuple(
+        f"left out: {row['reason'] or row['picture'] + ': doubtful: ' + '; '.join(row['doubts'])}"
+        for row in left_out
+    )
 
 
 def target_text(rows: Sequence[Mapping[str, Any]], options: PictureOptions) -> str:

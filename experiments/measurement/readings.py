@@ -86,25 +86,9 @@ def require_same_fit(fit: str, own: str, place: str) -> None:
 def readings_of(
     row: Row, size: ValueLimits, fit: str, known: Mapping[str, Observable], outlines: Outlines
 ) -> Iterator[Reading]:
-    """Read the values of a row.
+    """Read the values of a row, within the limits of its test; raise `PictureError` for a bad picture.
 
-    Parameters
-    ----------
-    size
-        Limits of the values in the row's test.
-    fit
-        Fit of the flanks in pictures.
-    known
-        Observables of the test by name and by alias.
-    outlines
-        Outlines of the file's pictures.
-
-    Raises
-    ------
-    InputError
-        When a cell is invalid.
-    imaging.PictureError
-        When the picture has no measurable heap.
+    ``known`` has the observables of the test by name and by alias, ``outlines`` those of the file's pictures.
     """
     name = row["observable"]
     if row["profile"]:

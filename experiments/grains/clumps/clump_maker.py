@@ -127,7 +127,8 @@ def make_clump(request: ClumpRequest, watch: Callable[[Trial], None] = lambda tr
     except InputError:
         raise
     except (ValueError, OSError) as error:
-        raise InputError(source, str(error)) from None
+        place, _, problem = str(error).partition(": ")
+        raise InputError(place, problem) if problem else InputError(source, place) from None
     return Clump(fit.shape, fit, solid=solid, trials=tuple(trials))
 
 

@@ -52,7 +52,6 @@ class Trial:
         )  # fmt: skip
 
     def within(self, tolerance: float) -> bool:
-        """Return True if volume, inertia and surface are within a tolerance."""
         return self.worst <= tolerance
 
     @property

@@ -15,13 +15,9 @@ NODES = 64
 class Distribution(Protocol):
     """Cumulative distribution of a diameter [m]; shares go from 0 to 1 with the diameter."""
 
-    def quantile(self, share: float) -> float:
-        """Return the diameter [m] of a share."""
-        ...
+    def quantile(self, share: float) -> float: ...
 
-    def moment(self, power: int, low: float, high: float) -> float:
-        """Integrate a power of the diameter over the shares between two [m^power]."""
-        ...
+    def moment(self, power: int, low: float, high: float) -> float: ...
 
 
 @dataclass(frozen=True)

@@ -54,12 +54,8 @@ def cut_classes(
 
     The number and the volume of the grains of each class are those of the distribution: its diameter is that
     of the grain of mean mass. `basis` is the quantity of the shares and quantiles, `unaccounted` the part of
-    the whole that is not in the distribution: what passes the finest sieve, or stays on the coarsest.
-
-    Raises
-    ------
-    ValueError
-        When a diameter would not be positive.
+    the whole that is not in the distribution: what passes the finest sieve, or stays on the coarsest. A
+    diameter that is not positive raises `ValueError`.
     """
     edges = np.linspace(*cut, count + 1)
     if not distribution.quantile(edges[0] or 1e-12) > 0.0:
