@@ -20,12 +20,6 @@ from imaging import HeapAngle, Snapshot, overlay, snapshot
 
 JPEG_QUALITY = 88
 
-ROW_WIDTH = 1500
-"""Columns of a row of heaps, at most."""
-
-ROW_HEAD = 40
-"""Rows above the heaps of a row for what is written there."""
-
 SHOWN_OF_A_STAGE = {"target": 1, "screening": 2, "climb": 2, "verification": 3}
 """Heaps shown of each stage, evenly from its flattest to its steepest."""
 
@@ -74,32 +68,6 @@ def _spread(cases: pd.DataFrame, count: int) -> pd.DataFrame:
     places = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
     picked = np.unique(np.rint(places * max(len(ordered) - 1, 0)).astype(int))
     return ordered.iloc[picked[picked < len(ordered)]]
-
-
-def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
-    """Draw heaps next to each other at one scale, on one plate: (rows, columns, 3), blue-green-red.
-
-    The study's measurement gives the angles; heaps come by what is written above them (ASCII).
-    """
-    drawn = [drawn_heap(study, result) for result in heaps.values()]
-    coarsest = max(picture.meters_per_pixel for _, picture, _ in drawn)
-    width = sum(image.shape[1] * picture.meters_per_pixel / coarsest for _, picture, image in drawn)
-    panels = []
-    for _, picture, image in drawn:
-        ratio = min(1.0, ROW_WIDTH / width) * picture.meters_per_pixel / coarsest
-        size = (round(ratio * image.shape[1]), round(ratio * image.shape[0]))
-        shrunk = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-        panels.append((shrunk, round(ratio * (picture.ground_row + 0.5))))
-    above = max(ground for _, ground in panels) + ROW_HEAD
-    below = max(len(image) - ground for image, ground in panels)
-    row = []
-    for (image, ground), title in zip(panels, heaps, strict=True):
-        top, bottom = above - ground, below - (len(image) - ground)
-        panel = cv2.copyMakeBorder(image, top, bottom, 0, 0, cv2.BORDER_REPLICATE)
-        place, font = (12, ROW_HEAD - 12), cv2.FONT_HERSHEY_DUPLEX
-        cv2.putText(panel, title, place, font, 0.6, (40, 32, 28), 1, cv2.LINE_AA)
-        row.append(panel)
-    return np.hstack(row)
 
 
 def drawn_heap(

@@ -29,7 +29,6 @@ from experiments.io.plain_data import jsonable
 from experiments.journal.journal import Journal
 from experiments.measurement.measured_target import with_measurements
 from experiments.report import heap_pictures, verified_heap, write_report
-from experiments.report.kit.markdown import WALL_TIMES
 from experiments.report.study_companion import Replay, companion_of
 from experiments.report.writer import library_versions
 from experiments.runs.lasting import lasting_files
@@ -56,6 +55,7 @@ def watching(
         yield report if listeners else None
 
 
+WALL_TIMES = "wall_times"
 WALL_TIMES_FILE = f"{WALL_TIMES}.csv"
 """File of the wall times of a folder's batches, over all runs that went on in it."""
 

@@ -27,12 +27,12 @@ from dem_warp.walls import Cylinder, Plane
 from doe.plots.palette import BLUE, GRID, VERMILION
 from experiments.commands.options import OneDevice
 from experiments.evidence.machine import machine
+from experiments.evidence.page_figures import new_axes, save_figure
 from experiments.evidence.performance.columns import CLUMP, reference_case
 from experiments.evidence.performance.result_pages import parse_counts, write_results
 from experiments.evidence.performance.roofline import memory_bytes
 from experiments.evidence.performance.timing import run_in, time_steps
 from experiments.evidence.verification.problems.setups import bodies
-from experiments.report.kit.figure import new_axes, save_figure
 
 DEPTH = 0.020
 """Of a bed at rest, roughly [m]."""

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from experiments.evidence.record_page import markdown_table, write_page
 from experiments.io.files import write_text
-from experiments.report.kit.markdown import markdown_table, write_page
 
 Part = tuple[str, str, pd.DataFrame]
 """Part of a page: its name, what is said above its table, the table."""

@@ -12,6 +12,8 @@ import numpy as np
 import pandas as pd
 
 from doe.plots.palette import BLUE, MUTED, VERMILION
+from experiments.evidence.page_figures import new_axes, save_figure
+from experiments.evidence.record_page import markdown_table, write_page
 from experiments.evidence.trials.declaration import Declaration, read_declaration
 from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS, read_findings
 from experiments.evidence.trials.score import (
@@ -39,8 +41,6 @@ from experiments.evidence.trials.trials_folder import (
 )
 from experiments.evidence.trials.truth import opened, read_labels, read_sealed, revealed
 from experiments.evidence.trials.truths import STRONG
-from experiments.report.kit.figure import new_axes, save_figure
-from experiments.report.kit.markdown import markdown_table, write_page
 
 TITLES = {
     EVERYTHING: "With every observable",

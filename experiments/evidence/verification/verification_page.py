@@ -10,10 +10,10 @@ import pandas as pd
 from matplotlib.ticker import NullLocator
 
 from doe.plots.palette import SERIES
+from experiments.evidence.page_figures import new_axes, save_figure
+from experiments.evidence.record_page import markdown_table, write_page
 from experiments.evidence.verification.check import Plot, Result, Row
 from experiments.io.files import write_text
-from experiments.report.kit.figure import new_axes, save_figure
-from experiments.report.kit.markdown import markdown_table, write_page
 
 VERDICTS = {True: "pass", False: "**FAIL**", None: "stated"}
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from markupsafe import Markup, escape
-from pandas.api.types import is_numeric_dtype
 
 from experiments.report.kit.numbers import KINDS, term
 
@@ -117,15 +116,6 @@ def make_table(
     styles = [""] * len(frame) if marks is None else list(marks)
     rows = tuple(Row(tuple(entries), style) for *entries, style in zip(*cells, styles, strict=True))
     return Table(name, caption, shown, rows, note)
-
-
-def plain_table(frame: pd.DataFrame) -> Table:
-    """Lay out a DataFrame as it is: heads as they stand, texts as they stand, numbers to four digits."""
-    columns = [
-        Column(str(name), str(name), "measured" if is_numeric_dtype(values) else "text", write=str)
-        for name, values in frame.items()
-    ]
-    return make_table("", frame, columns, "")
 
 
 def _cells(column: Column, values: pd.Series) -> list[Cell]:

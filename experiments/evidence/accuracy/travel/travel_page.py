@@ -21,8 +21,8 @@ from experiments.evidence.accuracy.travel.cards import (
     SOFTENING,
 )
 from experiments.evidence.accuracy.travel.travel_heaps import AZIMUTHS, FIT, HEAPS, NUMBER, OURS, Heap
+from experiments.evidence.record_page import markdown_page, markdown_table
 from experiments.io.files import write_text
-from experiments.report.kit.markdown import markdown_page, markdown_table
 
 MARGIN = 1.0
 """Difference of the mean angles that does not matter [degrees]."""

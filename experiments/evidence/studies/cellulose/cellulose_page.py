@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 
 from doe.plots.palette import BLUE, INK, MUTED, VERMILION
+from experiments.evidence.page_figures import new_axes, save_figure
+from experiments.evidence.record_page import facts_list, markdown_table, wall_times_table, write_page
 from experiments.evidence.studies.cellulose.cellulose_campaign import CURVES, FACTS, PREDICTION
 from experiments.evidence.studies.cellulose.cellulose_fit import (
     LEVEL,
@@ -30,8 +32,6 @@ from experiments.evidence.studies.cellulose.cellulose_plan import (
 )
 from experiments.evidence.studies.drum_commands import require_run
 from experiments.io.files import write_text
-from experiments.report.kit.figure import new_axes, save_figure
-from experiments.report.kit.markdown import facts_list, markdown_table, wall_times_table, write_page
 from experiments.report.kit.table import Column, Table, make_table
 from experiments.studyfile import Study
 

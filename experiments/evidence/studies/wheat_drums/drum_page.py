@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 
 from doe.plots.palette import BLUE, INK, VERMILION
+from experiments.evidence.page_figures import new_axes, save_figure
+from experiments.evidence.record_page import facts_list, markdown_table, wall_times_table, write_page
 from experiments.evidence.studies.drum_commands import require_run
 from experiments.evidence.studies.wheat_drums.drum_campaign import DRUMS, FACTS, HEAPS
 from experiments.evidence.studies.wheat_drums.drum_fit import LEVEL, Slopes, WheatFit, fit_slopes
 from experiments.evidence.studies.wheat_drums.drum_plan import PUBLISHED_HEAP, data, study_at
-from experiments.report.kit.figure import new_axes, save_figure
-from experiments.report.kit.markdown import facts_list, markdown_table, wall_times_table, write_page
 from experiments.report.kit.table import make_table
 from experiments.studyfile import Study
 

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from doe.plots.palette import GRID, SERIES
+from experiments.evidence.page_figures import save_figure
 from experiments.evidence.trials.baselines.method_tables import (
     Parts,
     alarm_scores,
@@ -17,7 +18,6 @@ from experiments.evidence.trials.baselines.method_tables import (
     outside_scores,
     power,
 )
-from experiments.report.kit.figure import save_figure
 
 
 def draw_roc(table: pd.DataFrame, path: Path) -> None:

@@ -19,6 +19,7 @@ import typer
 
 from doe.discrepancy import Verdict
 from experiments.commands.console import clear_errors
+from experiments.evidence.record_page import markdown_table, write_page
 from experiments.evidence.trials.baselines import benchmark_files
 from experiments.evidence.trials.baselines.answers_table import FOLDER, add_answer, file_of, read_answers
 from experiments.evidence.trials.baselines.measured_problems import open_labels, opened_trials
@@ -42,7 +43,6 @@ from experiments.evidence.trials.trials_folder import DECLARED, LABELS, NOTES, P
 from experiments.evidence.trials.truth import Label, read_labels, write_labels
 from experiments.io.errors import InputError
 from experiments.io.files import copy_file
-from experiments.report.kit.markdown import markdown_table, write_page
 
 SERIES = Path(__file__).parents[1] / "record"
 """Records of the trials: labels and declaration of a series are read there where it is kept whole."""

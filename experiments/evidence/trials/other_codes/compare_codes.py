@@ -13,10 +13,10 @@ import pandas as pd
 import typer
 
 from experiments.commands.console import clear_errors
+from experiments.evidence.record_page import markdown_table, write_page
 from experiments.evidence.trials.findings import EVERYTHING
 from experiments.evidence.trials.score import Share, by_outsider, confusion, foreign_aims
 from experiments.evidence.trials.trials_page import Record, read_record
-from experiments.report.kit.markdown import markdown_table, write_page
 
 
 def beside(records: Sequence[Record], view: str = EVERYTHING) -> pd.DataFrame:

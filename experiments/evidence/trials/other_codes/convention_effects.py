@@ -22,6 +22,7 @@ from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.commands.console import clear_errors
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
+from experiments.evidence.record_page import markdown_table
 from experiments.evidence.trials.generate_trials import STUDY
 from experiments.evidence.trials.other_codes.code_surfaces import Bench
 from experiments.evidence.trials.other_codes.offsets import measured_offsets, offsets_table
@@ -31,7 +32,6 @@ from experiments.evidence.trials.trials_folder import LABELS
 from experiments.evidence.trials.trials_page import read_record
 from experiments.evidence.trials.truth import Kind, Label, read_labels
 from experiments.io.errors import InputError
-from experiments.report.kit.markdown import markdown_table
 from experiments.studyfile import Study, load_study
 
 OFF, ERROR = "off, sd of one run", "standard error"

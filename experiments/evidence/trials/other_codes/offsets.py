@@ -23,6 +23,7 @@ from doe.discrepancy import Measured, fit_emulator
 from doe.discrepancy.fitting.fitted_model import Model
 from experiments.commands.console import clear_errors
 from experiments.discover.search import Search
+from experiments.evidence.record_page import markdown_table
 from experiments.evidence.trials.declaration import read_declaration
 from experiments.evidence.trials.generate_trials import STUDY, bank_beside
 from experiments.evidence.trials.trial_heaps import unpack_heaps
@@ -31,7 +32,6 @@ from experiments.evidence.trials.truth import Kind, Label, read_labels
 from experiments.io.errors import InputError
 from experiments.io.files import copy_file
 from experiments.measurement.measured_file import read_measured
-from experiments.report.kit.markdown import markdown_table
 from experiments.studyfile import load_study
 
 

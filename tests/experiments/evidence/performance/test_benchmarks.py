@@ -24,7 +24,7 @@ from experiments.evidence.performance.performance_record import record_page
 from experiments.evidence.performance.result_pages import parse_counts
 from experiments.evidence.performance.roofline import memory_bytes, step_traffic
 from experiments.evidence.performance.timing import run_in, start, time_steps
-from experiments.report.kit.markdown import markdown_table
+from experiments.evidence.record_page import markdown_table
 from experiments.studyfile import load_study
 
 DEVICE = "cpu"

@@ -17,12 +17,12 @@ from typing import Annotated
 import typer
 
 from experiments.commands.options import OneDevice
+from experiments.evidence.record_page import markdown_table
 from experiments.evidence.studies.buckwheat.bases.base_heaps import Folder, measure_bases, simulate_bases
 from experiments.evidence.studies.buckwheat.bases.choice import BaseChoice, written
 from experiments.evidence.studies.buckwheat.bases.choice_tables import choice_tables
 from experiments.evidence.studies.buckwheat.bases.grid import chosen_bases
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import open_settings
-from experiments.report.kit.markdown import markdown_table
 
 Out = Annotated[Path, typer.Option(help="Folder of the results.")]
 Names = Annotated[list[str] | None, typer.Option("--base", help="Name of a base; left out: all.")]

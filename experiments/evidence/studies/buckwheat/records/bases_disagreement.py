@@ -19,6 +19,7 @@ import pandas as pd
 import typer
 
 from doe.discrepancy import Candidate, Discovery, Emulator, Fit, Interval, Settings
+from experiments.evidence.record_page import markdown_page, markdown_table
 from experiments.evidence.studies.buckwheat.records.paper_page import Record
 from experiments.evidence.studies.buckwheat.records.paper_record import FOLDER
 from experiments.evidence.studies.buckwheat.records.published_heaps import (
@@ -32,7 +33,6 @@ from experiments.evidence.studies.buckwheat.records.published_heaps import (
 from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
 from experiments.io.files import write_text
 from experiments.io.plain_data import jsonable
-from experiments.report.kit.markdown import markdown_page, markdown_table
 from experiments.report.kit.numbers import estimate, fixed
 from experiments.report.kit.table import Column, Layout, columns, make_table
 

@@ -14,8 +14,11 @@ from dem_warp import CaseResult
 from doe import Agreement, agreement
 from doe.plots import agreement_plot
 from experiments.calibrate.results import Campaign
+from experiments.evidence.page_figures import save_figure
+from experiments.evidence.record_page import facts_list, markdown_page, markdown_table, wall_times_table
 from experiments.evidence.studies.buckwheat.bases.choice import BaseChoice
 from experiments.evidence.studies.buckwheat.bases.choice_tables import choice_tables
+from experiments.evidence.studies.buckwheat.records.heap_row import heap_row
 from experiments.evidence.studies.buckwheat.replay.replay import RUN, Replay
 from experiments.evidence.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
 from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, TABLES
@@ -23,11 +26,8 @@ from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sen
 from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_tables import sensitivity_tables
 from experiments.io.files import replacing, write_text
 from experiments.io.plain_data import jsonable
-from experiments.report.kit.figure import save_figure
-from experiments.report.kit.markdown import facts_list, markdown_page, markdown_table, wall_times_table
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.report.material_card import CARD
-from experiments.report.pictures import heap_row
 from experiments.studyfile import Study
 from imaging import save_picture
 

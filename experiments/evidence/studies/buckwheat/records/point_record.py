@@ -19,16 +19,16 @@ import typer
 
 from doe.plots.joint_plots import joint_plot
 from experiments.calibrate import Campaign, calibrate
-from experiments.io.errors import InputError
-from experiments.io.files import copy_file, existing, write_text
-from experiments.report.kit.figure import save_figure
-from experiments.report.kit.markdown import (
+from experiments.evidence.page_figures import save_figure
+from experiments.evidence.record_page import (
     WALL_TIMES,
     facts_list,
     markdown_table,
     wall_times_table,
     write_page,
 )
+from experiments.io.errors import InputError
+from experiments.io.files import copy_file, existing, write_text
 from experiments.report.kit.numbers import prose
 from experiments.report.response_tables import response_tables
 from experiments.runs.campaign import WALL_TIMES_FILE

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from experiments.evidence.record_page import markdown_table
 from experiments.evidence.trials.baselines import benchmark_files, record_methods, run_methods
 from experiments.evidence.trials.baselines.answers_table import add_answer, file_of, read_answers
 from experiments.evidence.trials.baselines.benchmark_files import (
@@ -37,7 +38,6 @@ from experiments.evidence.trials.score import auroc
 from experiments.evidence.trials.truth import Kind, Label, write_labels
 from experiments.evidence.trials.truths import STRONG, Declared
 from experiments.io.errors import InputError
-from experiments.report.kit.markdown import markdown_table
 
 RECORDS = Path(benchmark_files.FOLDER).parents[1] / "record"
 KEPT = RECORDS / "baselines"
