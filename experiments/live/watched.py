@@ -26,9 +26,12 @@ if TYPE_CHECKING:
 
 PAGES = {
     "watch.html": "text/html", "ui.html": "text/html", "style.css": "text/css", "page.js": "text/javascript",
-    "spheres.js": "text/javascript", "watch.js": "text/javascript", "ui.js": "text/javascript",
+    "heap_view.js": "text/javascript", "watch.js": "text/javascript", "ui.js": "text/javascript",
 }  # fmt: skip
 """Files of the pages and their kinds."""
+
+VIEWER = "heap_view.js"
+"""File of the viewer in three dimensions, which the report has too."""
 
 KINDS = {
     ".html": "text/html", ".csv": "text/csv", ".json": "application/json", ".toml": "text/plain",
@@ -50,7 +53,8 @@ def page_file(name: str) -> Response:
     """Answer with a file of the pages."""
     from starlette.responses import Response
 
-    text = files("experiments.live").joinpath("pages", name).read_text(encoding="utf-8")
+    folder = "report/kit/templates" if name == VIEWER else "live/pages"
+    text = files("experiments").joinpath(folder, name).read_text(encoding="utf-8")
     return Response(text, media_type=PAGES[name])
 
 

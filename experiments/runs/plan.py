@@ -83,7 +83,9 @@ def plan_calibration(study: Study, resources: Resources, published: int = 0, cam
     """Plan a calibration; published runs of the study, with so many replicates, come first."""
     study = check_runs(study, campaign, published > 0)
     tables = companion_of(study).planned_runs(published) if published else {}
-    stages = [(title, _sampled(study, table), len(table), len(table)) for title, table in tables.items()]
+    stages: list[_Stage] = [
+        (title, _sampled(study, table), len(table), len(table)) for title, table in tables.items()
+    ]
     stages += _campaign_stages(study) if campaign else []
     grains = max(work_of(case).grains for _, some, *_ in stages for case in some)
     return _plan(study, resources, stages, CASE_BYTES + GRAIN_BYTES * grains)

@@ -1,7 +1,7 @@
 // The page to start from. It asks the server for everything: what the form holds, what a shape gives, what a
 // file breaks, which command is called. Nothing is worked out here.
 import { ask as request, byId, element, show, table } from "./page.js";
-import { View } from "./spheres.js";
+import { View } from "./heap_view.js";
 
 const ask = (what, asked = {}) => request(`api/${what}`, asked);
 const value = (id) => byId(id).value.trim();

