@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -107,7 +108,7 @@ def _print_mean(rows: Sequence[Mapping[str, Any]], options: PictureOptions, as_j
 
     mean = mean_angle(rows, options)
     if as_json:
-        result = {"pictures": rows, "mean": mean.to_dict() if mean else None}
+        result = {"pictures": rows, "mean": asdict(mean) if mean else None}
         typer.echo(json.dumps(result, allow_nan=False))
         return
     print_angles(rows, options.fit)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -52,7 +53,7 @@ def print_clump(facts: Mapping[str, Any]) -> None:
 
 def print_trial(trial: Trial) -> None:
     """Show a number of spheres as it was tried."""
-    messages.print(f"{trial.spheres:3d} spheres: {_quality(trial.to_dict())}")
+    messages.print(f"{trial.spheres:3d} spheres: {_quality(asdict(trial))}")
 
 
 def _quality(trial: Mapping[str, Any]) -> str:

@@ -7,7 +7,7 @@ import io
 import os
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from glob import glob
 from pathlib import Path
@@ -220,10 +220,6 @@ class MeanAngle:
         if self.left_out:
             parts.append(f"{len(self.left_out)} doubtful left out")
         return "; ".join(parts)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the values for JSON."""
-        return asdict(self)
 
 
 def used_rows(rows: Sequence[Mapping[str, Any]], options: PictureOptions) -> list[Mapping[str, Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,7 +71,7 @@ class Clump:
             "bounding_radius_mm": 1e3 * shape.bounding_radius,
             "coverage": fit.coverage if fit else None,
             "overshoot": fit.overshoot if fit else None,
-            "trials": [trial.to_dict() for trial in self.trials],
+            "trials": [asdict(trial) for trial in self.trials],
             "spheres_mm": spheres,
         }
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -51,17 +51,10 @@ class Trial:
             1e3 * distance, distance / diameter,
         )  # fmt: skip
 
-    def within(self, tolerance: float) -> bool:
-        return self.worst <= tolerance
-
     @property
     def worst(self) -> float:
         """Largest of the three errors."""
         return max(abs(self.volume_error), self.inertia_error, self.surface_error)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the values for JSON."""
-        return asdict(self)
 
 
 def fit_by_volume(solid: Trimesh, sphere_count: int) -> tuple[ClumpFit, float]:
@@ -102,7 +95,7 @@ def fit_within(
             fit, reach = fit_clump(solid, count, protrusion), protrusion
         trials.append(Trial.of(fit, reach))
         watch(trials[-1])
-        if trials[-1].within(tolerance):
+        if trials[-1].worst <= tolerance:
             return fit, trials
     best = min(trials, key=lambda each: each.worst)
     problem = (

@@ -20,10 +20,6 @@ from experiments.io.units import UNITS
 _NEEDED = ("x", "y", "z")
 
 
-def _recognises(head: str) -> bool:
-    return head.lstrip().startswith("<")
-
-
 def _read(path: Path) -> SphereFile:
     text = read_text(path, LARGEST)
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text):
@@ -68,4 +64,4 @@ def _entries(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
                 yield kind, value
 
 
-XML = Format("XML with an element for each sphere", _recognises, _read)
+XML = Format("XML with an element for each sphere", lambda head: head.lstrip().startswith("<"), _read)

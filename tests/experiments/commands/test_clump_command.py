@@ -71,7 +71,7 @@ def test_a_tolerance_takes_the_first_number_of_spheres_that_keeps_it() -> None:
     seen: list[Trial] = []
     fit, trials = fit_within(parse_solid("ellipsoid:6x3x3"), 0.2, None, seen.append)
     assert seen == trials
-    assert [trial.within(0.2) for trial in trials] == [False] * (len(trials) - 1) + [True]
+    assert [trial.worst <= 0.2 for trial in trials] == [False] * (len(trials) - 1) + [True]
     assert trials[-1].spheres == fit.shape.sphere_count > 1
 
 
