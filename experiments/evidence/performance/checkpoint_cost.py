@@ -89,13 +89,7 @@ def stretches_within(case: Case, seconds: float) -> float:
 
 
 def row(name: str, case: Case, limit: float, pairs: int) -> dict[str, Any]:
-    """Row of a case.
-
-    Raises
-    ------
-    RuntimeError
-        When a run with checkpoints ends otherwise than one without.
-    """
+    """Row of a case."""
     stretches = stretches_within(case, limit)
     run(case, min(stretches, 3), None)  # compiles
     with_: list[Run] = []

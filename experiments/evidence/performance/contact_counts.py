@@ -40,11 +40,6 @@ def count_contacts(
     """Count the touching pairs of spheres in place [m]; `grain` is the one that each belongs to.
 
     Walls are planes, and cylinders of which the rims are left out.
-
-    Raises
-    ------
-    ValueError
-        If there is another kind of wall.
     """
     pairs = cKDTree(centers).query_pairs(2 * radii.max(), output_type="ndarray")
     a, b = pairs[grain[pairs[:, 0]] != grain[pairs[:, 1]]].T

@@ -20,11 +20,6 @@ def record_page(folder: Path, name: str, readme: Path, record: Path) -> None:
 
     The page goes between the lines ``<!-- begin NAME -->`` and ``<!-- end NAME -->`` of the readme. Tables
     and pictures go to the folder `record` beside it; their suffix is what follows the first dash of NAME.
-
-    Raises
-    ------
-    ValueError
-        If there is not one page, or no such place for it.
     """
     pages = sorted(folder.glob("*.md"))
     if len(pages) != 1:

@@ -12,13 +12,7 @@ Part = tuple[str, str, pd.DataFrame]
 
 
 def parse_counts(text: str) -> list[int]:
-    """Return the numbers of a list such as "1,12,31".
-
-    Raises
-    ------
-    ValueError
-        If one is not a positive integer.
-    """
+    """Return the numbers of a list such as "1,12,31"."""
     words = [word.strip() for word in text.split(",")]
     if not all(word.isdecimal() and int(word) > 0 for word in words):
         raise ValueError(f"must be positive integers separated by commas, got {text!r}")

@@ -88,13 +88,7 @@ def here(case: Case[Any]) -> Heap:
 
 
 def there(code: str, case: Case[Any]) -> Heap:
-    """Simulate the heap by another code on one thread.
-
-    Raises
-    ------
-    RuntimeError
-        When the code stops with an error.
-    """
+    """Simulate the heap by another code on one thread."""
     driver = Driver(code, approximate=True)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)

@@ -66,13 +66,7 @@ def is_installed() -> bool:
 
 @contextmanager
 def one_node(folder: Path, cpus: int = 4) -> Iterator[dict[str, str]]:
-    """Start SLURM with one node in an empty folder; yield the environment that its commands need.
-
-    Raises
-    ------
-    RuntimeError
-        When the node is not ready in time.
-    """
+    """Start SLURM with one node in an empty folder; yield the environment that its commands need."""
     folder = folder.resolve()
     for name in ("state", "spool", "munge"):
         (folder / name).mkdir(parents=True)

@@ -52,13 +52,7 @@ def drum_commands(package: str, about: str, default: Path) -> typer.Typer:
 
 
 def require_run(folder: Path, *names: str) -> None:
-    """Refuse a folder that a finished run has not left.
-
-    Raises
-    ------
-    InputError
-        With the files that it lacks.
-    """
+    """Refuse a folder that a finished run has not left."""
     if lacking := [name for name in names if not (folder / name).is_file()]:
         rule = "must be the folder of a finished run: run the study first"
         raise InputError(str(folder), rule, f"without {', '.join(lacking)}")

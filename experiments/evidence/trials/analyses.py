@@ -82,11 +82,6 @@ class TimedSimulator:
         """Return the observables of every point.
 
         Points with the same mechanisms come into the same batch, as these run one compiled kernel.
-
-        Raises
-        ------
-        OutOfTime
-            When the deadline passes before all have run.
         """
         order = sorted(range(len(points)), key=lambda i: tuple(name for name, _ in points[i].sizes))
         values = np.full((len(points), len(self.observables)), np.nan)

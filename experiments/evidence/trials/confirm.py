@@ -30,13 +30,7 @@ from experiments.studyfile import load_study
 
 
 def points_of(bank: Bank, search: Search) -> list[Point]:
-    """Points of a bank's runs, row by row, as they were drawn.
-
-    Raises
-    ------
-    InputError
-        When its rows are not those that such a bank would have today.
-    """
+    """Points of a bank's runs, row by row, as they were drawn."""
     each, base = len(bank.space.conditions), bank.mechanism < 0
     points = len(np.unique(bank.theta[base], axis=0))
     settings = replace(

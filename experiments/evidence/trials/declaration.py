@@ -60,13 +60,7 @@ class Declaration:
 
 
 def read_declaration(path: Path) -> Declaration:
-    """Read what `Declaration.write` wrote.
-
-    Raises
-    ------
-    InputError
-        When the settings are not the ones whose hash stands beside them.
-    """
+    """Read what `Declaration.write` wrote."""
     document = json.loads(path.read_text(encoding="utf-8"))
     sha256 = document.pop("settings_sha256")
     settings = document.pop("settings")

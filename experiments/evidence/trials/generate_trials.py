@@ -73,13 +73,7 @@ app = typer.Typer(help="Draw, seal and simulate blind trials.")
 
 
 def bank_beside(scale: str) -> Path:
-    """Find the bank that is kept for a scale of the trial study.
-
-    Raises
-    ------
-    InputError
-        When it has none.
-    """
+    """Find the bank that is kept for a scale of the trial study."""
     path = STUDY.with_name(f"bank-{scale}.npz" if scale else "bank.npz")
     if not path.is_file():
         hint = f"Make it with `python -m {__name__} bank`, and pass it by --bank."
@@ -103,11 +97,6 @@ def seal_trials(
     """Declare what the trials should show, draw the truths, and write seals and labels.
 
     The seed of the drawing must not be known to whoever knows the plan; the library never has the strangers.
-
-    Raises
-    ------
-    InputError
-        When the folder has sealed trials.
     """
     if folder.sealed.exists():
         raise InputError(str(folder.sealed), "the folder has sealed trials", hint="Choose another folder.")

@@ -37,11 +37,6 @@ def gather(folder: Folder, record: Path, heaps: bool = False) -> None:
     """Take a folder's files over into a record, with the labels of the trials that have been analysed.
 
     The measured heaps go with them where another code made them, or where they are asked for.
-
-    Raises
-    ------
-    InputError
-        When a file is missing, or a label is missing or does not fit its seal.
     """
     files = [folder.record / name for name in (DECLARED, SEALED, FINDINGS, RUNS)]
     reality = folder.record / REALITY

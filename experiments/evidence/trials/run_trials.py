@@ -68,11 +68,6 @@ def run_trials(
 
     There are as many processes for analyses as `workers` of the simulator. After so many seconds no further
     batch is begun.
-
-    Raises
-    ------
-    OutOfTime
-        When analyses have not ended by then.
     """
     deadline = time.monotonic() + seconds
     declaration = read_declaration(folder.declared)

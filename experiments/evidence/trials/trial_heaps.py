@@ -86,13 +86,7 @@ def pack_heaps(folder: Folder, archive: Path) -> Path:
 
 
 def unpack_heaps(archive: Path, folder: Folder) -> int:
-    """Unpack the measured heaps of the sealed trials of a folder, and count them.
-
-    Raises
-    ------
-    InputError
-        When the file is no archive, or holds anything else.
-    """
+    """Unpack the measured heaps of the sealed trials of a folder, and count them."""
     known = {folder.measured(trial.trial).name: trial.trial for trial in read_sealed(folder.sealed)}
     count = 0
     try:

@@ -111,13 +111,7 @@ class Record:
 
 
 def read_record(folder: Path) -> Record:
-    """Read a record; labels of trials that have not been analysed may be missing.
-
-    Raises
-    ------
-    InputError
-        When a label is missing, or does not fit its seal.
-    """
+    """Read a record; labels of trials that have not been analysed may be missing."""
     findings, sealed = read_findings([folder / FINDINGS]), read_sealed(folder / SEALED)
     truths = revealed(read_labels(folder / LABELS), opened(sealed, findings["trial"]))
     reality = folder / REALITY
@@ -126,13 +120,7 @@ def read_record(folder: Path) -> Record:
 
 
 def write_trials_page(folder: Path) -> Path:
-    """Write the page and the pictures of a record from its files, its notes after the introduction.
-
-    Raises
-    ------
-    InputError
-        When a label does not fit its seal.
-    """
+    """Write the page and the pictures of a record from its files, its notes after the introduction."""
     record, notes = read_record(folder), folder / NOTES
     heaps = _FOREIGN.format(code=record.code) if record.reality else _OURS
     parts = [f"{heaps} {_SEALED}", *([notes.read_text(encoding="utf-8")] if notes.is_file() else [])]

@@ -94,13 +94,7 @@ def write_sealed(path: Path, trials: Sequence[Sealed]) -> None:
 
 
 def read_sealed(path: Path) -> tuple[Sealed, ...]:
-    """Read what `write_sealed` wrote.
-
-    Raises
-    ------
-    InputError
-        When the file has other columns.
-    """
+    """Read what `write_sealed` wrote."""
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.DictReader(file)
         if tuple(reader.fieldnames or ()) != _COLUMNS:
@@ -127,13 +121,7 @@ def opened(sealed: Sequence[Sealed], analysed: Iterable[str]) -> list[Sealed]:
 
 
 def revealed(labels: Sequence[Label], sealed: Sequence[Sealed]) -> dict[str, Label]:
-    """Labels by trial, each held to its seal.
-
-    Raises
-    ------
-    InputError
-        When a label is missing, or is not the one that was sealed.
-    """
+    """Labels by trial, each held to its seal."""
     by_trial = {label.trial: label for label in labels}
     for trial in sealed:
         if trial.trial not in by_trial:

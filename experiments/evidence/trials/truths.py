@@ -116,12 +116,6 @@ def draw(
     Theta is uniform in the ranges of the factors, the size of a mechanism in its own part of its range.
     Within each part ("alone", "outside", "pairs") the trials are shuffled, so that a name says nothing. The
     analysis knows the mechanisms of the library, and never the strangers.
-
-    Raises
-    ------
-    InputError
-        When the plan names what is not in the library, or pairs are asked for and fewer than two mechanisms
-        are resolvable.
     """
     if foreign := set(plan.mechanisms) - {effect.name for effect in library}:
         raise InputError("Plan.mechanisms", "must be mechanisms of the library", sorted(foreign))

@@ -19,11 +19,6 @@ def run_input(program: str, folder: Path, moment: Moment, plan: Plan, version: s
     """Run the input of a folder.
 
     `version` is its pattern in the log; the stretches come after a number of runs `before` them.
-
-    Raises
-    ------
-    RuntimeError
-        If the program stops with an error.
     """
     status = execute([program, "-in", INPUT, "-log", LOG], folder)
     log = (folder / LOG).read_text(encoding="utf-8", errors="replace")

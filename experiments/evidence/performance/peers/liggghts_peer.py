@@ -65,13 +65,7 @@ def simulate(program: str, folder: Path, case: Case[LiftedCylinder], moment: Mom
 
 
 def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> None:
-    """Write `column.in` and `clump.txt`.
-
-    Raises
-    ------
-    ValueError
-        If the grains differ in size.
-    """
+    """Write `column.in` and `clump.txt`."""
     setup, shape = moment.setup, moment.setup.shapes[0]
     np.savetxt(folder / "clump.txt", np.column_stack([shape.centers, shape.radii]), fmt="%.15g")
     count = setup.grains.count

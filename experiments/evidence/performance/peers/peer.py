@@ -61,28 +61,14 @@ class Peer:
     case, the moment and the plan."""
 
     def locate(self) -> str:
-        """Return the path of the executable.
-
-        Raises
-        ------
-        ValueError
-            If there is none.
-        """
+        """Return the path of the executable."""
         if path := shutil.which(self.program):
             return path
         wanted = f"{self.program} must be installed (Debian package {self.package})"
         raise ValueError(f"peer: {wanted}, found none")
 
     def run(self, folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> PeerRun:
-        """Run a settled column; `folder` is made for the files.
-
-        Raises
-        ------
-        ValueError
-            If the code is not installed, or cannot simulate such grains.
-        RuntimeError
-            If it stops with an error.
-        """
+        """Run a settled column; `folder` is made for the files."""
         program = self.locate()
         folder.mkdir(parents=True, exist_ok=True)
         return self.simulate(program, folder, case, moment, plan)
@@ -98,13 +84,7 @@ def execute(command: Sequence[str], folder: Path) -> int:
 
 
 def common_size(moment: Moment) -> float:
-    """Size of all grains of a column.
-
-    Raises
-    ------
-    ValueError
-        If they differ.
-    """
+    """Size of all grains of a column."""
     sizes = moment.setup.grains.sizes
     if np.ptp(sizes) > 0.0:
         raise ValueError(f"peer: grains must be of one size, got {sizes.min():g} to {sizes.max():g}")

@@ -131,13 +131,7 @@ def simulate(program: str, folder: Path, case: Case[LiftedCylinder], moment: Mom
 
 
 def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> None:
-    """Write `column.py`, the script, and `column.json`, which it reads.
-
-    Raises
-    ------
-    ValueError
-        If the grains differ in size.
-    """
+    """Write `column.py`, the script, and `column.json`, which it reads."""
     setup = moment.setup
     grains, shape, scene = setup.grains, setup.shapes[0], case.scene
     size = common_size(moment)

@@ -132,13 +132,7 @@ def edge_file(folder: Path, name: str) -> Path:
 
 
 def read_edges(folder: Path, name: str) -> Edges:
-    """Read the edges of a case.
-
-    Raises
-    ------
-    FileNotFoundError
-        When it was never looked at.
-    """
+    """Read the edges of a case."""
     path = edge_file(folder, name)
     if not path.is_file():
         raise FileNotFoundError(f"no edges of the case: {path}")

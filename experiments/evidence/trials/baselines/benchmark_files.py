@@ -109,13 +109,7 @@ def _record(effect: Declared) -> dict[str, object]:
 
 
 def load_benchmark(folder: Path = FOLDER) -> Benchmark:
-    """Read the banks, the rules and the trials, without the answers.
-
-    Raises
-    ------
-    InputError
-        When the files are none of a benchmark.
-    """
+    """Read the banks, the rules and the trials, without the answers."""
     path = folder / TRIALS
     if not path.is_file() or path.stat().st_size > LARGEST:
         raise InputError(str(path), f"must be a file of at most {LARGEST:,} bytes", "none, or a larger one")

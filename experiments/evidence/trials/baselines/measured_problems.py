@@ -32,11 +32,6 @@ def opened_trials(place: Path) -> Iterator[Folder]:
     """Open a folder of trials, or a record: a folder with its files, for the time being.
 
     A record lies flat, and its heaps, where it keeps them, are packed.
-
-    Raises
-    ------
-    InputError
-        When it is neither.
     """
     if not (place / SEALED).is_file():
         if not Folder(place).sealed.is_file():
@@ -63,11 +58,6 @@ def measured_problems(place: Path, bank: Path | None = None, count: int | None =
     """Pose the first so many trials that have heaps, as the search has them in the view of their plan.
 
     The seed is the search's. Left out, the bank is that of the scale.
-
-    Raises
-    ------
-    InputError
-        When no trial has heaps.
     """
     with opened_trials(place) as folder:
         declaration = read_declaration(folder.declared)
@@ -86,13 +76,7 @@ def measured_problems(place: Path, bank: Path | None = None, count: int | None =
 
 
 def open_labels(folder: Folder) -> list[Label]:
-    """Labels of the trials that the search has analysed: no other may be shown.
-
-    Raises
-    ------
-    InputError
-        When there are no labels or findings, or a label is missing or does not fit its seal.
-    """
+    """Labels of the trials that the search has analysed: no other may be shown."""
     for file in (folder.findings, folder.hidden_labels):
         if not file.is_file():
             raise InputError(str(file), "needs findings of the search, and the truths", "no such file")

@@ -94,13 +94,7 @@ one answer is due.
 
 
 def gather(out: Path, record: Path, labels: Sequence[Label]) -> None:
-    """Take answers and truths over into a record.
-
-    Raises
-    ------
-    InputError
-        When there are no answers.
-    """
+    """Take answers and truths over into a record."""
     files = sorted((out / FOLDER).glob("*.csv"))
     if not files:
         raise InputError(str(out / FOLDER), "needs answers of methods", "none")

@@ -53,13 +53,7 @@ def answer_all(out: Path, problems: Iterator[Problem], wanted: Mapping[str, Meth
 
 
 def chosen(names: str, known: Mapping[str, Method]) -> dict[str, Method]:
-    """Pick methods by their names, parted by semicolons; without any all that are installed.
-
-    Raises
-    ------
-    InputError
-        For a name that no method has.
-    """
+    """Pick methods by their names, parted by semicolons; without any all that are installed."""
     wanted = [name.strip() for name in names.split(";") if name.strip()] or list(installed(known))
     for name in wanted:
         if name not in known:

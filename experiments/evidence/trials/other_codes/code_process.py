@@ -99,13 +99,7 @@ TIME_LIMIT = 1800.0
 
 
 def engine_for(code: str, workers: int | None = None) -> ProgramEngine:
-    """Engine that runs a code, so many heaps at once.
-
-    Raises
-    ------
-    InputError
-        When there is none of the name.
-    """
+    """Engine that runs a code, so many heaps at once."""
     if code not in CODES:
         raise InputError("--code", f"must be one of {', '.join(CODES)}", code)
     return ProgramEngine(CODES[code], workers, TIME_LIMIT)

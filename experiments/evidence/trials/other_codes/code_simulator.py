@@ -38,11 +38,6 @@ class OtherCodeSimulator(EngineSimulator):
         That of the trial.
     table, workers
         As of `EngineSimulator`.
-
-    Raises
-    ------
-    InputError
-        When there is no such code.
     """
 
     def __init__(

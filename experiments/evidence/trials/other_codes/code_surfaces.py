@@ -34,13 +34,7 @@ FILL_MARGIN = 0.12
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A case on the bench of another workshop: its test, grains and surfaces.
-
-    Raises
-    ------
-    InputError
-        When its grains differ in shape, or it has a mechanism that no other code makes.
-    """
+    """A case on the bench of another workshop: its test, grains and surfaces."""
 
     case: Case[LiftedCylinder]
 

@@ -54,13 +54,7 @@ class Grasp:
 
     @property
     def weights(self) -> np.ndarray:
-        """Parts of the spheres' centres that add up to the centre of mass, (S,).
-
-        Raises
-        ------
-        AnswerError
-            When the centre of mass is no such sum.
-        """
+        """Parts of the spheres' centres that add up to the centre of mass, (S,)."""
         count = self.shape.sphere_count
         system = np.vstack([self.shape.centers.T / self.shape.bounding_radius, np.ones(count)])
         wanted = np.array([0.0, 0.0, 0.0, 1.0])
@@ -74,11 +68,6 @@ class Grasp:
 
         Spheres without a body, which has the number -1 then, are left out: LIGGGHTS takes a grain away as
         soon as one of its spheres leaves the box, and its others at their next step.
-
-        Raises
-        ------
-        AnswerError
-            When a body has not the spheres of the shape.
         """
         count = self.shape.sphere_count
         rows = rows[rows[:, 1] > 0]
@@ -109,13 +98,7 @@ class Grasp:
 
 
 def read_film(path: Path, shape: ClumpShape) -> Iterator[Frame]:
-    """Frames of a dump, in order.
-
-    Raises
-    ------
-    AnswerError
-        When it is missing or malformed.
-    """
+    """Frames of a dump, in order."""
     grasp = Grasp(shape)
     try:
         texts = path.read_text(encoding="utf-8").split("ITEM: TIMESTEP\n")[1:]
@@ -136,13 +119,7 @@ def read_film(path: Path, shape: ClumpShape) -> Iterator[Frame]:
 
 
 def read_balance(path: Path) -> Mapping[int, float]:
-    """Mean force on the tube along its axis since the look before [N], by step.
-
-    Raises
-    ------
-    AnswerError
-        When the file is missing or malformed.
-    """
+    """Mean force on the tube along its axis since the look before [N], by step."""
     try:
         rows = np.loadtxt(path, comments="#", ndmin=2)
     except (OSError, ValueError) as error:
@@ -159,6 +136,7 @@ class FilmedLift(LiftController):
         self.begin(view, view.alive)
 
     def finish(self, view: WorldView) -> None:
+<<<<<<< HEAD
         """End where the code has ended, which found the grains at rest at its own looks.
 
         Raises
@@ -167,6 +145,10 @@ class FilmedLift(LiftController):
             When the tube is not clear of the heap.
         """
         elapsed = view.time - self.state.phase_start
+=======
+        """End where the code has ended, which found the grains at rest at its own looks."""
+        elapsed = view.time - self.course.phase_start
+>>>>>>> 84a8e909 (wip)
         if not self.scene.lift_speed * elapsed > view.highest + self.reach:
             raise AnswerError("the film ends before the tube is clear of the heap")
         self._finish(view, elapsed)
@@ -175,13 +157,7 @@ class FilmedLift(LiftController):
 def filmed_observables(
     case: Case[LiftedCylinder], frames: Iterator[Frame], forces: Mapping[int, float]
 ) -> tuple[dict[str, float], Frame, str]:
-    """Observables of a filmed test, its last frame, and why it failed; empty where it did not.
-
-    Raises
-    ------
-    AnswerError
-        When the film has no start, a look without its force, or ends too soon.
-    """
+    """Observables of a filmed test, its last frame, and why it failed; empty where it did not."""
     first = next(frames, None)
     if first is None:
         raise AnswerError("the film has no frame")

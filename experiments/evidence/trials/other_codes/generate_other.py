@@ -65,13 +65,7 @@ app = typer.Typer(help="Draw, seal and measure blind trials whose heaps another 
 
 
 def plan_for(code: str, plan: Plan) -> Plan:
-    """Plan whose mechanisms a code can make: all of them, where it names none.
-
-    Raises
-    ------
-    InputError
-        When it names one that the code cannot make.
-    """
+    """Plan whose mechanisms a code can make: all of them, where it names none."""
     known = MADE[code]
     if strange := sorted(set(plan.mechanisms) - set(known)):
         raise InputError("Plan.mechanisms", f"{code} makes only {', '.join(known)}", strange)

@@ -92,13 +92,7 @@ run {check}
 
 
 def lammps_files(bench: Bench) -> dict[str, str]:
-    """Files of the input of a case, by name.
-
-    Raises
-    ------
-    InputError
-        When it has liquid bridges, which LAMMPS does not make.
-    """
+    """Files of the input of a case, by name."""
     if bench.bridges() is not None:
         raise InputError("the case", "LAMMPS has no liquid bridges", CapillaryBridge.name)
     end = _END.format(check=bench.check_steps)

@@ -11,13 +11,7 @@ from dem_warp import LiftedCylinder, Parameter
 
 @dataclass(frozen=True)
 class OddLift(LiftedCylinder):
-    """A lifted cylinder of another workshop.
-
-    Raises
-    ------
-    ValueError
-        When a number leaves its bounds, or the tube closes.
-    """
+    """A lifted cylinder of another workshop."""
 
     taper: Annotated[float, Parameter("rad", at_least=0.0, at_most=0.2)] = 0.0
     """Half the angle of the cone that the tube is part of: it narrows upwards, its radius is right at half

@@ -81,13 +81,7 @@ def offsets_table(observables: Mapping[str, str], off: np.ndarray, runs: np.ndar
 
 
 def measured_offsets(record: Path, bank: Path | None = None) -> tuple[pd.DataFrame, int]:
-    """Offsets of the revealed nulls of a record, and their number.
-
-    Raises
-    ------
-    InputError
-        When the record has no heaps, or no two revealed nulls.
-    """
+    """Offsets of the revealed nulls of a record, and their number."""
     scale = read_declaration(record / DECLARED).scale
     search = Search.of(load_study(STUDY, scale or None))
     base = Model(fit_emulator(search.read_bank(bank or bank_beside(scale))), (), 0.0)

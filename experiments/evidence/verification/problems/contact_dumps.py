@@ -32,15 +32,7 @@ def box_of(setup: PathSetup) -> tuple[float, ...]:
 
 
 def run_path(program: str, package: str, text: str, folder: Path, count: int) -> Trajectory:
-    """Run an input in a folder and read its states.
-
-    Raises
-    ------
-    ValueError
-        When the program is not installed.
-    RuntimeError
-        When it stops with an error.
-    """
+    """Run an input in a folder and read its states."""
     if (found := shutil.which(program)) is None:
         raise ValueError(f"{program} must be installed (Debian package {package}), found none")
     (folder / INPUT).write_text(text, encoding="utf-8")

@@ -66,13 +66,7 @@ EQUAL = (RADII[0], RADII[0])
 
 
 def deme_contacts(device: str) -> Result:
-    """Compare every path with the states that are kept.
-
-    Raises
-    ------
-    ValueError
-        When there are none.
-    """
+    """Compare every path with the states that are kept."""
     kept = Path(__file__).with_name(STATES)
     if not kept.is_file():
         raise ValueError(f"{STATES}: the states of DEM-Engine must be kept first, found none")

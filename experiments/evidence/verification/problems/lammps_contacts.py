@@ -47,13 +47,7 @@ SHARE_TOLERANCE = 0.15
 
 
 def lammps_contacts(device: str) -> Result:
-    """Compare every path.
-
-    Raises
-    ------
-    ValueError
-        When LAMMPS is not installed.
-    """
+    """Compare every path."""
     with tempfile.TemporaryDirectory() as folder:
         part = compare_paths("LAMMPS", every_path(PRESETS["lammps"]), follow, Path(folder), device, EXPLAINED)
         falls = [_falls(path, Path(folder), device) for path in PATHS if path.name in EXPLAINED]

@@ -92,13 +92,7 @@ class Meeting:
 
 
 def liggghts_clumps(device: str) -> Result:
-    """Compare pairs without friction, with some and with much.
-
-    Raises
-    ------
-    ValueError
-        When LIGGGHTS is not installed.
-    """
+    """Compare pairs without friction, with some and with much."""
     shape, meeting = read_clump(CLUMP).shape, Meeting.drawn()
     rows: list[Row] = []
     for friction in FRICTIONS:

@@ -28,13 +28,7 @@ the two trajectories over their size."""
 
 
 def liggghts_contacts(device: str) -> Result:
-    """Compare every path under both resistances to rolling that LIGGGHTS has here.
-
-    Raises
-    ------
-    ValueError
-        When LIGGGHTS is not installed.
-    """
+    """Compare every path under both resistances to rolling that LIGGGHTS has here."""
     with tempfile.TemporaryDirectory() as folder:
         parts = [
             compare_paths("LIGGGHTS", paths(PRESETS[name]), follow, Path(folder) / name, device)

@@ -39,13 +39,7 @@ PROGRAM = "yade_path.txt"
 
 
 def yade_contacts(device: str) -> Result:
-    """Compare every path.
-
-    Raises
-    ------
-    ValueError
-        When Yade is not installed.
-    """
+    """Compare every path."""
     with tempfile.TemporaryDirectory() as folder:
         part = compare_paths("Yade", every_path(PRESETS["yade"]), follow, Path(folder), device)
     return result_of("Yade", TEXT, [part])

@@ -73,13 +73,7 @@ class Base:
 
 @cache
 def grid() -> Grid:
-    """Read the options.
-
-    Raises
-    ------
-    StudyError
-        When the file breaks a rule.
-    """
+    """Read the options."""
     text = _FILE.read_text(encoding="utf-8")
     read = validated(Grid, tomllib.loads(text), Places.read(_FILE, text))
     for estimator in read.estimator:
@@ -99,13 +93,7 @@ def bases() -> dict[str, Base]:
 
 
 def chosen_bases(names: Iterable[str]) -> list[Base]:
-    """Look bases up in the order of the grid; no names: all of them.
-
-    Raises
-    ------
-    InputError
-        When there is no such base.
-    """
+    """Look bases up in the order of the grid; no names: all of them."""
     known, wanted = bases(), list(names)
     for name in wanted:
         if name not in known:

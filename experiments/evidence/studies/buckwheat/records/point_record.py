@@ -71,11 +71,6 @@ def gather(scale: str, source: Path, record: Path, commit: str | None = None) ->
     """Take over the cases of a campaign's folder, and what made them.
 
     Where the machine that made them had no repository, the commit is given.
-
-    Raises
-    ------
-    InputError
-        When the folder holds no finished campaign.
     """
     results, times = existing(source / "results.json"), existing(source / WALL_TIMES_FILE)
     copy_file(source / "tables" / CASES, record / scale / CASES)

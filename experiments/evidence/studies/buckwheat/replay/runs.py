@@ -48,11 +48,6 @@ def planned_cases(replicates: int, stages: Iterable[str] = tuple(STAGES)) -> pd.
     """Lay out the cases of some stages: every run some times, each case with its own seed.
 
     A row a case: stage, run, replicate, every factor in its natural unit, published (angle [deg]), seed.
-
-    Raises
-    ------
-    ValueError
-        When there is less than one replicate, or no such stage.
     """
     wanted = list(stages)
     if replicates < 1:

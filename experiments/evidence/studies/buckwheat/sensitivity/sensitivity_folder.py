@@ -14,13 +14,7 @@ SETTINGS = "settings.json"
 
 
 def open_settings(folder: Path, settings: dict[str, Any]) -> None:
-    """Note in a folder how its variants are simulated.
-
-    Raises
-    ------
-    StoreError
-        When the folder holds variants that were simulated otherwise.
-    """
+    """Note in a folder how its variants are simulated."""
     path = folder / SETTINGS
     if path.is_file() and (found := json.loads(path.read_text(encoding="utf-8"))) != settings:
         raise StoreError(

@@ -71,13 +71,7 @@ def variants() -> dict[str, Variant]:
 
 
 def chosen_variants(names: Iterable[str]) -> list[Variant]:
-    """Look variants up in the order of the file; no names: all of them.
-
-    Raises
-    ------
-    InputError
-        When there is no such variant.
-    """
+    """Look variants up in the order of the file; no names: all of them."""
     known, wanted = variants(), list(names)
     for name in wanted:
         if name not in known:

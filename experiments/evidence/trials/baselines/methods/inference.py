@@ -57,13 +57,7 @@ class Sbi:
     level = f"{100 * LEVEL:g} % (draws of the base)"
 
     def __call__(self, problem: Problem) -> Answer:
-        """Learn from draws, and look at the means.
-
-        Raises
-        ------
-        InputError
-            Without `sbi`, with the command that installs it.
-        """
+        """Learn from draws, and look at the means."""
         require_sbi()
         rng = np.random.default_rng(problem.seed)
         base = problem.stack(())
@@ -84,13 +78,7 @@ def is_installed() -> bool:
 
 
 def require_sbi() -> None:
-    """Refuse to go on where `sbi` is not installed.
-
-    Raises
-    ------
-    InputError
-        With the command that installs it.
-    """
+    """Refuse to go on where `sbi` is not installed."""
     if not is_installed():
         raise InputError("--methods", f"simulation-based inference needs sbi: {EXTRA}", "not installed: sbi")
 
