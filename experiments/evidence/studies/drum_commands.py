@@ -16,18 +16,8 @@ from experiments.io.files import require_folder
 Out = Annotated[Path, typer.Option(help="Folder of the results.")]
 
 
-def drum_commands(package: str, about: str, default: Path) -> typer.Typer:
-    """Make the commands ``run`` and ``page`` of a study.
-
-    Parameters
-    ----------
-    package
-        Package of the study: its ``campaign.run_study`` runs it, its ``page.write_record`` writes the page.
-    about
-        Help of the command.
-    default
-        Folder of the results.
-    """
+def drum_commands(study: str, about: str, default: Path) -> typer.Typer:
+    """Make the commands ``run`` and ``page`` of a study, whose modules begin with a name; they load late."""
     app = typer.Typer(help=about, no_args_is_help=True)
 
     @app.command()
@@ -40,13 +30,13 @@ def drum_commands(package: str, about: str, default: Path) -> typer.Typer:
         """Simulate, calibrate, predict."""
         with clear_errors("What is stored is not simulated again."):
             require_folder(out)
-            import_module(f"{package}.campaign").run_study(scale, out, device, workers)
+            import_module(f"{study}_campaign").run_study(scale, out, device, workers)
 
     @app.command()
     def page(out: Out = default) -> None:
         """Write the page of a finished run."""
         with clear_errors():
-            print(import_module(f"{package}.page").write_record(out))
+            print(import_module(f"{study}_page").write_record(out))
 
     return app
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from experiments.evidence.studies.drum_commands import drum_commands
 
-app = drum_commands("experiments.evidence.studies.cellulose", __doc__, Path("out/cellulose"))
+app = drum_commands("experiments.evidence.studies.cellulose.cellulose", __doc__, Path("out/cellulose"))
 
 if __name__ == "__main__":
     app()

@@ -18,7 +18,7 @@ from experiments.evidence.studies.drum_commands import Out, drum_commands
 
 DEFAULT = Path("out/wheat-drums")
 
-app = drum_commands("experiments.evidence.studies.wheat_drums", __doc__, DEFAULT)
+app = drum_commands("experiments.evidence.studies.wheat_drums.drum", __doc__, DEFAULT)
 
 
 @app.command()

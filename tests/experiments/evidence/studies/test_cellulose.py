@@ -141,7 +141,7 @@ def test_a_measured_edge_has_no_residual():
 
 
 def test_an_unknown_scale_is_refused(tmp_path):
-    with pytest.raises(InputError, match="the scale is one of h200, bench"):
+    with pytest.raises(InputError, match="must be one of h200, bench"):
         cellulose_campaign.run_study("paper", tmp_path)
 
 

@@ -14,10 +14,6 @@ ABSENT = "cuda:99"
 SCRIPTS = [
     ("experiments.evidence.studies.cellulose.__main__", ["run", "--scale", "bench"]),
     ("experiments.evidence.studies.wheat_drums.__main__", ["run", "--scale", "bench"]),
-    ("experiments.evidence.studies.buckwheat.bases.__main__", ["simulate"]),
-    ("experiments.evidence.studies.buckwheat.sensitivity.__main__", []),
-    ("experiments.studies.buckwheat.climb", []),
-    ("experiments.evidence.accuracy.outlines.outlines_record", ["--out", "out"]),
     ("experiments.evidence.verification.__main__", []),
 ]
 
@@ -38,9 +34,6 @@ def run(module: str, words: list[str]) -> tuple[int, str]:
     [
         ("experiments.evidence.studies.cellulose.__main__", ["run", "--scale", "bench", "--device", "cpu"]),
         ("experiments.evidence.studies.wheat_drums.__main__", ["run", "--scale", "bench", "--device", "cpu"]),
-        ("experiments.evidence.accuracy.outlines.outlines_record", []),
-        ("experiments.evidence.accuracy.outlines.drawn_outlines", []),
-        ("experiments.evidence.performance.fillings", []),
     ],
 )
 def test_a_folder_that_is_a_file_is_refused_before_anything_runs(

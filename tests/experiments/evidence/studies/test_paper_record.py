@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from pathlib import Path
 
@@ -12,7 +11,6 @@ import pytest
 from analytic_heaps import analytic_heaps, study_with
 
 from experiments.calibrate import Campaign, calibrate
-from experiments.evidence.studies.buckwheat.bases.grid import bases, grid
 from experiments.evidence.studies.buckwheat.records import paper_record
 from experiments.evidence.studies.buckwheat.records.paper_page import (
     PAGE,
@@ -25,7 +23,6 @@ from experiments.evidence.studies.buckwheat.records.paper_page import (
 from experiments.evidence.studies.buckwheat.replay.replay import Replay
 from experiments.evidence.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
 from experiments.evidence.studies.buckwheat.replay.runs import planned_cases
-from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
 from experiments.io.errors import InputError
 from experiments.report.material_card import CARD, write_material_card
 from experiments.studyfile import Study, load_study
@@ -99,32 +96,17 @@ def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaig
     assert f"Outcome: {campaign.outcome.value}. {campaign.reason}" in page
 
 
-def test_a_record_takes_in_a_card_scales_sensitivities_and_notes(
+def test_a_record_includes_a_card_scales_notes_and_side_studies(
     tmp_path: Path, campaign: Campaign, study: Study
 ) -> None:
-    bench, varied, record = tmp_path / "bench", tmp_path / "varied", tmp_path / "record"
+    bench, record = tmp_path / "bench", tmp_path / "record"
     for folder, shift in ((tmp_path / "paper", 0.0), (bench, -4.0)):
         write_record(folder / "record", cases(shift), {"commit": None}, campaign)
     write_material_card(campaign, study, tmp_path / "paper")
-    varied.mkdir()
-    (varied / "settings.json").write_text(
-        json.dumps({"scale": "paper", "modulus_scale": 10.0, "replicates": 1}), encoding="utf-8"
-    )
-    for name in ("base", "clump-flat"):
-        plan = variants()[name].planned_cases(1)
-        plan.assign(status="finished", reason="", angle=plan["published"] + 1.0).to_csv(
-            varied / f"{name}.csv"
-        )
-    tried = tmp_path / "tried"
-    tried.mkdir()
-    (tried / "settings.json").write_bytes((varied / "settings.json").read_bytes())
-    for name, off in (("edem-printed-endless", 3.0), ("relative-flat-round", -1.0)):
-        plan = bases()[name].variant.planned_cases(1).assign(status="finished", reason="")
-        read = {f"angle_{option.name}": plan["published"] + off for option in grid().estimator[:1]}
-        plan.assign(**read).to_csv(tried / f"{name}.csv")
     record.mkdir()
     (record / "notes.md").write_text("What we make of it.", encoding="utf-8")
-    paper_record.main(tmp_path / "paper", [f"bench={bench}"], varied, tried, "abc123", record)
+    (record / "side_studies.md").write_text("## Another clump", encoding="utf-8")
+    paper_record.main(tmp_path / "paper", [f"bench={bench}"], "abc123", record)
     page = (record / PAGE).read_text(encoding="utf-8")
     assert "What we make of it." in page
     assert f"]({CARD})" in page
@@ -135,12 +117,8 @@ def test_a_record_takes_in_a_card_scales_sensitivities_and_notes(
     # The same noise in both: the difference is the shift.
     assert cost.bias.value == pytest.approx(-4.0)
     assert numbers_of(page, "What a smaller scale costs")[0][4] == "−4.00"
-    shown = {row[1]: row for row in numbers_of(page, "What the paper does not say")}
-    assert shown["nine spheres in a pyramid of flat faces"][2] == "0.00"
-    assert shown["thirty spheres in the flat pyramid"][-1] == "not run"
-    section = "The base, chosen by leaving tables out"
-    assert numbers_of(page, section)[0][:4] == ["**relative**", "flat", "round", "flank"]
-    paper_record.main(None, None, None, None, None, record)
+    assert "## Another clump" in page
+    paper_record.main(None, None, None, record)
     assert (record / PAGE).read_text(encoding="utf-8") == page
 
 

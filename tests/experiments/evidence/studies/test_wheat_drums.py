@@ -137,7 +137,7 @@ def test_the_heap_is_of_thirty_grams():
 
 
 def test_an_unknown_scale_is_refused(tmp_path):
-    with pytest.raises(InputError, match="the scale is one of h200, bench"):
+    with pytest.raises(InputError, match="must be one of h200, bench"):
         drum_campaign.run_study("paper", tmp_path)
 
 

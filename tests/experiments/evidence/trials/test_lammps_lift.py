@@ -96,7 +96,7 @@ def test_lammps_refuses_liquid_bridges_by_name() -> None:
     bridge = CapillaryBridge(between="grains", surface_tension=0.01, bridge_volume=5e-11)
     with pytest.raises(InputError, match=r"LAMMPS has no liquid bridges, got capillary"):
         lammps_text(replace(case_of(), mechanisms=(bridge,)))
-    with pytest.raises(InputError, match=r"lammps makes contact_adhesion, .*liquid_bridges"):
+    with pytest.raises(InputError, match=r"lammps makes only contact_adhesion, .*liquid_bridges"):
         plan_for("lammps", Plan(mechanisms=("liquid_bridges",)))
 
 

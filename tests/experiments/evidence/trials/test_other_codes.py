@@ -295,7 +295,7 @@ def test_the_plan_holds_at_least_120_trials_of_what_the_code_can_make() -> None:
     singles = plan.strong * len(plan.mechanisms)
     assert (plan.nulls, singles, plan.pairs) == (40, 48, 12)
     assert plan.nulls + singles + plan.pairs + plan.strangers * len(STRANGERS) >= 120
-    with pytest.raises(InputError, match="liggghts makes"):
+    with pytest.raises(InputError, match="liggghts makes only"):
         plan_for("liggghts", Plan(mechanisms=("air_drag",)))
     with pytest.raises(InputError, match="must be one of lammps, liggghts"):
         engine_for("edem")

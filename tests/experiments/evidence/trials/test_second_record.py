@@ -12,12 +12,11 @@ from typer.testing import CliRunner
 from doe.discrepancy import Settings, Verdict
 from experiments.evidence.trials.declaration import Declaration
 from experiments.evidence.trials.findings import EVERYTHING, Finding, findings_table, write_findings
-from experiments.evidence.trials.other_codes.compare_codes import write_comparison
 from experiments.evidence.trials.other_codes.generate_other import app, write_reality
 from experiments.evidence.trials.record_trials import gather
 from experiments.evidence.trials.run_trials import open_jobs
 from experiments.evidence.trials.trial_heaps import unpack_heaps
-from experiments.evidence.trials.trials_folder import HEAPS, LABELS, PAGE, REALITY, Folder
+from experiments.evidence.trials.trials_folder import HEAPS, LABELS, REALITY, Folder
 from experiments.evidence.trials.trials_page import read_record, write_trials_page
 from experiments.evidence.trials.truth import (
     Kind,
@@ -84,7 +83,7 @@ def test_only_what_has_been_analysed_is_revealed(folder: Folder, tmp_path: Path)
 
 def test_a_label_that_is_not_there_reveals_nothing(folder: Folder, tmp_path: Path) -> None:
     write_labels(folder.hidden_labels, [label_of(MEASURED), label_of(UNTOUCHED)])
-    with pytest.raises(InputError, match="every sealed trial has a label"):
+    with pytest.raises(InputError, match="the sealed trial has no label"):
         gather(folder, tmp_path / "record")
     assert not (tmp_path / "record").exists()
 
@@ -124,16 +123,3 @@ def test_an_archive_of_anything_else_is_refused(folder: Folder, tmp_path: Path) 
         with pytest.raises(InputError, match="only heaps of sealed trials"):
             unpack_heaps(archive, folder)
     assert folder.measured(ANALYSED).read_text().startswith("condition")
-
-
-def test_two_realities_stand_side_by_side(folder: Folder, tmp_path: Path) -> None:
-    record = tmp_path / "record"
-    gather(folder, record)
-    own = Folder(tmp_path / "own")
-    gather(folder, own.root)
-    (own.root / REALITY).unlink()
-    page = write_comparison(tmp_path / PAGE, [read_record(own.root), read_record(record)])
-    text = page.read_text(encoding="utf-8")
-    assert "dem-warp, bench, 1 of 3 trials" in text
-    assert "LIGGGHTS, bench, 1 of 3 trials" in text
-    assert "| plate_tilt | 1 | 1 (3 to 100) |" in text

@@ -237,6 +237,6 @@ def test_a_kept_record_scores_as_its_page_says(series: str, tmp_path: Path) -> N
 def test_trials_that_have_not_run_leave_a_record_as_it_is(tmp_path: Path) -> None:
     folder = Folder(tmp_path / "trials")
     write_sealed(folder.sealed, [])
-    with pytest.raises(InputError, match="trials that are revealed have run"):
+    with pytest.raises(InputError, match="the trials have not run yet"):
         gather(folder, tmp_path / "record")
     assert not (tmp_path / "record").exists()

@@ -14,16 +14,15 @@ from dem_warp import CaseResult
 from doe import Agreement, agreement
 from doe.plots import agreement_plot
 from experiments.calibrate.results import Campaign
+<<<<<<< HEAD
 from experiments.evidence.page_figures import save_figure
 from experiments.evidence.record_page import facts_list, markdown_page, markdown_table, wall_times_table
-from experiments.evidence.studies.buckwheat.bases.choice import BaseChoice
-from experiments.evidence.studies.buckwheat.bases.choice_tables import choice_tables
 from experiments.evidence.studies.buckwheat.records.heap_row import heap_row
+=======
+>>>>>>> 70f7f956 (Side studies of the paper are a kept chapter; one-off benchmarks leave their tables)
 from experiments.evidence.studies.buckwheat.replay.replay import RUN, Replay
 from experiments.evidence.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
 from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, TABLES
-from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
-from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_tables import sensitivity_tables
 from experiments.io.files import replacing, write_text
 from experiments.io.plain_data import jsonable
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
@@ -35,8 +34,8 @@ PAGE, RUNS, PROVENANCE, CAMPAIGN = "README.md", "runs.csv", "provenance.json", "
 RECORD = "record"
 """Folder of the page in that of the runs."""
 HEAPS, SCATTER, NOTES = "heaps.png", "agreement.png", "notes.md"
-SENSITIVITIES, BASES = "sensitivities", "bases"
-"""Folders of the variants' angles, and of those of the bases that were tried."""
+SIDE_STUDIES = "side_studies.md"
+"""Chapters on variants of the model and on other bases, as the code of commit e6d63b6a wrote them."""
 
 SHOWN = {"Screening 3": ("screening", 3), "Screening 12": ("screening", 12), "Optimum": ("verification", 1)}
 """Runs in the picture of heaps."""
@@ -57,12 +56,12 @@ class Record:
     """There is a card of the material that it chose."""
     scales: Mapping[str, Replay] = field(default_factory=dict)
     """The same runs at smaller scales, by name."""
-    sensitivities: Sensitivities | None = None
-    bases: BaseChoice | None = None
     picture: bool = False
     """There is a picture of heaps."""
     notes: str = ""
     """A person's reading of the numbers, Markdown."""
+    side_studies: str = ""
+    """Chapters on variants and other bases, Markdown."""
 
     @classmethod
     def read(cls, folder: Path) -> Record:
@@ -75,10 +74,11 @@ class Record:
             json.loads(campaign.read_text(encoding="utf-8")) if campaign.is_file() else None,
             (folder / CARD).is_file(),
             {name: Replay(pd.read_csv(path)) for name, path in scales.items()},
-            Sensitivities.read(folder / SENSITIVITIES),
-            BaseChoice.read(folder / BASES),
             (folder / HEAPS).is_file(),
-            (folder / NOTES).read_text(encoding="utf-8") if (folder / NOTES).is_file() else "",
+            *(
+                path.read_text(encoding="utf-8") if path.is_file() else ""
+                for path in (folder / NOTES, folder / SIDE_STUDIES)
+            ),
         )
 
 
@@ -166,8 +166,7 @@ def record_page(record: Record) -> str:
         *_section("Verification", tables, "verification"),
         *_campaign(record),
         *_scales(record),
-        *_sensitivities(record.sensitivities),
-        *_bases(record.bases),
+        record.side_studies,
         "## Every run",
         markdown_table(tables["runs"]),
         f"Every heap, with its seed, stands in [{RUNS}]({RUNS}).",
@@ -216,23 +215,6 @@ def _scales(record: Record) -> list[str]:
     ]
     table = make_table("scales", pd.DataFrame(rows), shown, "The 31 runs at smaller scales.")
     return ["## What a smaller scale costs", markdown_table(table)]
-
-
-def _sensitivities(found: Sensitivities | None) -> list[str]:
-    if found is None:
-        return []
-    tables = sensitivity_tables(found)
-    return ["## What the paper does not say", *(markdown_table(table) for table in tables.values())]
-
-
-def _bases(found: BaseChoice | None) -> list[str]:
-    if found is None:
-        return []
-    tables = choice_tables(found)
-    return [
-        "## The base, chosen by leaving tables out",
-        *(markdown_table(table) for table in tables.values()),
-    ]
 
 
 def _json(value: Mapping[str, Any]) -> str:

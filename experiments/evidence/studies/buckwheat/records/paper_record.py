@@ -1,12 +1,9 @@
 """The record of the paper's runs: gathered from the folders that made it, its page written anew.
 
     python -m experiments.evidence.studies.buckwheat --campaign --scale paper --out out/paper
-    python -m experiments.evidence.studies.buckwheat.sensitivity --modulus-scale 10 --out out/sensitivities
     python -m experiments.evidence.studies.buckwheat --scale bench --out out/bench
-    python -m experiments.evidence.studies.buckwheat.bases simulate --modulus-scale 100 --out out/bases
-    python -m experiments.evidence.studies.buckwheat.bases measure --out out/bases
     python -m experiments.evidence.studies.buckwheat.records.paper_record --paper out/paper \\
-        --smaller bench=out/bench --sensitivities out/sensitivities --bases out/bases
+        --smaller bench=out/bench
 
 Without a folder it writes the page again from the tables of the record. The record lies in
 ``experiments/evidence/studies/buckwheat/record``.
@@ -20,20 +17,14 @@ from typing import Annotated
 
 import typer
 
-from experiments.evidence.studies.buckwheat.bases.base_heaps import Folder
-from experiments.evidence.studies.buckwheat.bases.grid import bases
 from experiments.evidence.studies.buckwheat.records.paper_page import (
-    BASES,
     CAMPAIGN,
     HEAPS,
     PROVENANCE,
     RECORD,
     RUNS,
-    SENSITIVITIES,
     write_record_page,
 )
-from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_folder import SETTINGS
-from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
 from experiments.io.files import copy_file, write_text
 from experiments.report.material_card import CARD
 
@@ -63,22 +54,6 @@ def gather_scale(name: str, source: Path, record: Path) -> None:
     copy_file(source / RECORD / RUNS, record / f"runs-{name}.csv")
 
 
-def gather_sensitivities(source: Path, record: Path) -> None:
-    """Take over the angles of every variant that was simulated."""
-    copy_file(source / SETTINGS, record / SENSITIVITIES / SETTINGS)
-    for name in variants():
-        if (source / f"{name}.csv").is_file():
-            copy_file(source / f"{name}.csv", record / SENSITIVITIES / f"{name}.csv")
-
-
-def gather_bases(source: Path, record: Path) -> None:
-    """Take over the angles of every base that was simulated and read."""
-    copy_file(source / SETTINGS, record / BASES / SETTINGS)
-    for path in (Folder(source).table(base) for base in bases().values()):
-        if path.is_file():
-            copy_file(path, record / BASES / path.name)
-
-
 def main(
     paper_folder: Annotated[
         Path | None, typer.Option("--paper", help="Folder of a calibration with the paper's runs.")
@@ -86,8 +61,6 @@ def main(
     smaller: Annotated[
         list[str] | None, typer.Option(metavar="NAME=FOLDER", help="The same at a smaller scale.")
     ] = None,
-    sensitivities: Annotated[Path | None, typer.Option(help="Folder of the variants.")] = None,
-    tried: Annotated[Path | None, typer.Option("--bases", help="Folder of the bases.")] = None,
     commit: Annotated[str | None, typer.Option(help="Commit that made the paper's runs.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the record.")] = FOLDER,
 ) -> None:
@@ -97,10 +70,6 @@ def main(
     for text in smaller or []:
         name, _, source = text.partition("=")
         gather_scale(name, Path(source), out)
-    if sensitivities:
-        gather_sensitivities(sensitivities, out)
-    if tried:
-        gather_bases(tried, out)
     print(write_record_page(out))
 
 

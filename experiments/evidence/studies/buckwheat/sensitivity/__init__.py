@@ -1,1 +1,0 @@
-"""Sensitivity of the paper's angles to what the paper does not say."""
