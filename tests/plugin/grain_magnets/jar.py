@@ -9,7 +9,7 @@ from dem_warp.parameters import Parameter
 from dem_warp.scenes.poured_controller import Phase, PouredController
 from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.scenes.rain import CrossSection
-from dem_warp.scenes.scene import SceneState, Decision
+from dem_warp.scenes.scene import Decision, SceneState
 from dem_warp.walls import Cylinder, Disc
 
 

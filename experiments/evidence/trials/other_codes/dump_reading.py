@@ -136,19 +136,8 @@ class FilmedLift(LiftController):
         self.begin(view, view.alive)
 
     def finish(self, view: WorldView) -> None:
-<<<<<<< HEAD
-        """End where the code has ended, which found the grains at rest at its own looks.
-
-        Raises
-        ------
-        AnswerError
-            When the tube is not clear of the heap.
-        """
-        elapsed = view.time - self.state.phase_start
-=======
         """End where the code has ended, which found the grains at rest at its own looks."""
-        elapsed = view.time - self.course.phase_start
->>>>>>> 84a8e909 (wip)
+        elapsed = view.time - self.state.phase_start
         if not self.scene.lift_speed * elapsed > view.highest + self.reach:
             raise AnswerError("the film ends before the tube is clear of the heap")
         self._finish(view, elapsed)

@@ -14,12 +14,9 @@ from dem_warp import CaseResult
 from doe import Agreement, agreement
 from doe.plots import agreement_plot
 from experiments.calibrate.results import Campaign
-<<<<<<< HEAD
 from experiments.evidence.page_figures import save_figure
 from experiments.evidence.record_page import facts_list, markdown_page, markdown_table, wall_times_table
 from experiments.evidence.studies.buckwheat.records.heap_row import heap_row
-=======
->>>>>>> 70f7f956 (Side studies of the paper are a kept chapter; one-off benchmarks leave their tables)
 from experiments.evidence.studies.buckwheat.replay.replay import RUN, Replay
 from experiments.evidence.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
 from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, TABLES
