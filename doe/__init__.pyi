@@ -1,132 +1,86 @@
 """The public names: each is loaded with its module when it is first used."""
 
-from .curves.curve_emulator import CurveEmulator
-from .curves.curve_fit import CurveFit, Forecast, MeasuredCurve, fit_curves
-from .curves.profile_sample import Mode, ProfileSample, scatter_of_views
-from .design.anova import ErrorTerm, pure_error
-from .design.design import Design
-from .design.factors import Category, Factor
-from .design.families.aliases import AliasStructure, alias_structure
-from .design.families.augment import add_axial, add_center, foldover, join
-from .design.families.box_behnken import box_behnken
-from .design.families.central_composite import central_composite
-from .design.families.definitive import definitive_screening
-from .design.families.factorial import fractional_factorial, full_factorial
-from .design.families.mixture import Mixture, simplex_centroid, simplex_lattice
-from .design.families.optimal import optimal_design
-from .design.families.plackett_burman import plackett_burman
-from .design.families.quality import DesignQuality, design_quality, power_table
-from .design.families.space_filling import latin_hypercube, sobol
-from .errors import DesignError, TargetError
-from .response.analysis.canonical import CanonicalAnalysis, canonical, ridge_path
-from .response.analysis.desirability import BestSetting, Wish, maximize, minimize, most_desirable
-from .response.analysis.diagnostics import BoxCox, RobustTable, box_cox, influence, robust_coefficients
-from .response.analysis.formula import LinearFit, fit_formula, fit_mixture
-from .response.analysis.optimum_region import stationary_region
-from .response.joint_fit import Goal, JointFit, joint_fit
-from .response.region import Region
-from .response.response_surface import Surface, fit_surface
-from .response.surface_points import StationaryPoint
-from .response.transfer import Transfer, transfer, transfer_points
-from .samples.agreement import Agreement, Estimate, agreement
-from .samples.noise_floor import (
-    NoiseFloor,
-    VarianceRatio,
-    curvature_test,
-    detectable_effect,
-    effect_power,
-    noise_floor,
-    variance_ratio,
-)
-from .samples.sample import Sample
-from .samples.two_means import Comparison, compare_means
-from .screen.screened_effects import ScreenResult, aliases, screen
-from .screen.steepest import ClimbPath, climb_table, steepest_path
-from .screen.two_level_effects import TwoLevelEffects, two_level_effects
-
-__all__ = [
-    "Agreement",
-    "AliasStructure",
-    "BestSetting",
-    "BoxCox",
-    "CanonicalAnalysis",
-    "Category",
-    "ClimbPath",
-    "Comparison",
-    "CurveEmulator",
-    "CurveFit",
-    "Design",
-    "DesignError",
-    "DesignQuality",
-    "ErrorTerm",
-    "Estimate",
-    "Factor",
-    "Forecast",
-    "Goal",
-    "JointFit",
-    "LinearFit",
-    "MeasuredCurve",
-    "Mixture",
-    "Mode",
-    "NoiseFloor",
-    "ProfileSample",
-    "Region",
-    "RobustTable",
-    "Sample",
-    "ScreenResult",
-    "StationaryPoint",
-    "Surface",
-    "TargetError",
-    "Transfer",
-    "TwoLevelEffects",
-    "VarianceRatio",
-    "Wish",
-    "add_axial",
-    "add_center",
-    "agreement",
-    "alias_structure",
-    "aliases",
-    "box_behnken",
-    "box_cox",
-    "canonical",
-    "central_composite",
-    "climb_table",
-    "compare_means",
-    "curvature_test",
-    "definitive_screening",
-    "design_quality",
-    "detectable_effect",
-    "effect_power",
-    "fit_curves",
-    "fit_formula",
-    "fit_mixture",
-    "fit_surface",
-    "foldover",
-    "fractional_factorial",
-    "full_factorial",
-    "influence",
-    "join",
-    "joint_fit",
-    "latin_hypercube",
-    "maximize",
-    "minimize",
-    "most_desirable",
-    "noise_floor",
-    "optimal_design",
-    "plackett_burman",
-    "power_table",
-    "pure_error",
-    "ridge_path",
-    "robust_coefficients",
-    "scatter_of_views",
-    "screen",
-    "simplex_centroid",
-    "simplex_lattice",
-    "sobol",
-    "stationary_region",
-    "steepest_path",
-    "transfer",
-    "transfer_points",
-    "two_level_effects",
-    "variance_ratio",
-]
+from .curves.curve_emulator import CurveEmulator as CurveEmulator
+from .curves.curve_fit import CurveFit as CurveFit
+from .curves.curve_fit import Forecast as Forecast
+from .curves.curve_fit import MeasuredCurve as MeasuredCurve
+from .curves.curve_fit import fit_curves as fit_curves
+from .curves.profile_sample import Mode as Mode
+from .curves.profile_sample import ProfileSample as ProfileSample
+from .curves.profile_sample import scatter_of_views as scatter_of_views
+from .design.anova import ErrorTerm as ErrorTerm
+from .design.anova import pure_error as pure_error
+from .design.design import Design as Design
+from .design.factors import Category as Category
+from .design.factors import Factor as Factor
+from .design.families.aliases import AliasStructure as AliasStructure
+from .design.families.aliases import alias_structure as alias_structure
+from .design.families.augment import add_axial as add_axial
+from .design.families.augment import add_center as add_center
+from .design.families.augment import foldover as foldover
+from .design.families.augment import join as join
+from .design.families.box_behnken import box_behnken as box_behnken
+from .design.families.central_composite import central_composite as central_composite
+from .design.families.definitive import definitive_screening as definitive_screening
+from .design.families.factorial import fractional_factorial as fractional_factorial
+from .design.families.factorial import full_factorial as full_factorial
+from .design.families.mixture import Mixture as Mixture
+from .design.families.mixture import simplex_centroid as simplex_centroid
+from .design.families.mixture import simplex_lattice as simplex_lattice
+from .design.families.optimal import optimal_design as optimal_design
+from .design.families.plackett_burman import plackett_burman as plackett_burman
+from .design.families.quality import DesignQuality as DesignQuality
+from .design.families.quality import design_quality as design_quality
+from .design.families.quality import power_table as power_table
+from .design.families.space_filling import latin_hypercube as latin_hypercube
+from .design.families.space_filling import sobol as sobol
+from .errors import DesignError as DesignError
+from .errors import TargetError as TargetError
+from .response.analysis.canonical import CanonicalAnalysis as CanonicalAnalysis
+from .response.analysis.canonical import canonical as canonical
+from .response.analysis.canonical import ridge_path as ridge_path
+from .response.analysis.canonical import stationary_region as stationary_region
+from .response.analysis.desirability import BestSetting as BestSetting
+from .response.analysis.desirability import Wish as Wish
+from .response.analysis.desirability import maximize as maximize
+from .response.analysis.desirability import minimize as minimize
+from .response.analysis.desirability import most_desirable as most_desirable
+from .response.analysis.diagnostics import BoxCox as BoxCox
+from .response.analysis.diagnostics import RobustTable as RobustTable
+from .response.analysis.diagnostics import box_cox as box_cox
+from .response.analysis.diagnostics import influence as influence
+from .response.analysis.diagnostics import robust_coefficients as robust_coefficients
+from .response.analysis.formula import LinearFit as LinearFit
+from .response.analysis.formula import fit_formula as fit_formula
+from .response.analysis.formula import fit_mixture as fit_mixture
+from .response.joint_fit import Goal as Goal
+from .response.joint_fit import JointFit as JointFit
+from .response.joint_fit import joint_fit as joint_fit
+from .response.region import Region as Region
+from .response.response_surface import Surface as Surface
+from .response.response_surface import fit_surface as fit_surface
+from .response.surface_points import StationaryPoint as StationaryPoint
+from .response.transfer import Transfer as Transfer
+from .response.transfer import transfer as transfer
+from .response.transfer import transfer_points as transfer_points
+from .samples.agreement import Agreement as Agreement
+from .samples.agreement import Estimate as Estimate
+from .samples.agreement import agreement as agreement
+from .samples.replicate_noise import NoiseFloor as NoiseFloor
+from .samples.replicate_noise import VarianceRatio as VarianceRatio
+from .samples.replicate_noise import curvature_test as curvature_test
+from .samples.replicate_noise import detectable_effect as detectable_effect
+from .samples.replicate_noise import effect_power as effect_power
+from .samples.replicate_noise import noise_floor as noise_floor
+from .samples.replicate_noise import variance_ratio as variance_ratio
+from .samples.sample import Sample as Sample
+from .samples.two_means import Comparison as Comparison
+from .samples.two_means import compare_means as compare_means
+from .screen.screened_effects import ScreenResult as ScreenResult
+from .screen.screened_effects import aliases as aliases
+from .screen.screened_effects import screen as screen
+from .screen.steepest import ClimbPath as ClimbPath
+from .screen.steepest import climb_table as climb_table
+from .screen.steepest import steepest_path as steepest_path
+from .screen.two_level_effects import TwoLevelEffects as TwoLevelEffects
+from .screen.two_level_effects import two_level_effects as two_level_effects

@@ -1,4 +1,4 @@
-"""Rules that every number given to this package must keep: real, finite, a level, a count."""
+"""Checks of arguments: numbers, levels, counts, lists, arrays."""
 
 import math
 import numbers
@@ -12,21 +12,9 @@ from doe.errors import DesignError
 
 
 def checked_number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
-    """Return a finite real number as a float.
+    """Return a finite real number as a float, above ``above`` and at least ``least``.
 
-    Parameters
-    ----------
-    name : str
-        What the number is, for the error.
-    value
-        What was received.
-    above, least : float
-        It must be larger than ``above``, and at least ``least``.
-
-    Raises
-    ------
-    DesignError
-        Anything else, with the rule and what was received.
+    Raises DesignError: anything else, with the rule and the value.
     """
     if not isinstance(value, numbers.Real) or isinstance(value, bool | np.bool_):
         raise DesignError(f"{name} must be a number, got {value!r}")
@@ -55,8 +43,8 @@ def checked_kind(name: str, value: Any, kind: type[Kind]) -> Kind:
 
 
 def checked_list(name: str, values: Any) -> list:
-    """Return values as a list; raise DesignError when they are none: a text, a mapping, a table."""
-    # a table is told by its columns: pandas need not be loaded to read factors
+    """Return values as a list; raise DesignError for a text, a mapping, a table or no iterable."""
+    # a table is recognised by its columns: pandas need not be loaded to read factors
     if (
         not isinstance(values, Iterable)
         or isinstance(values, str | bytes | Mapping)
@@ -74,9 +62,9 @@ def checked_flag(name: str, value: Any) -> bool:
 
 
 def checked_choice(name: str, value: Any, choices: Collection[str]) -> str:
-    """Return a name; raise DesignError unless it is one of some."""
+    """Return a name; raise DesignError unless it is one of the choices."""
     if not isinstance(value, str) or value not in choices:
-        raise DesignError(f"{name} is one of {', '.join(choices)}, got {value!r}")
+        raise DesignError(f"{name} must be one of {', '.join(choices)}, got {value!r}")
     return value
 
 
@@ -90,19 +78,19 @@ def checked_map(name: str, value: Any) -> dict:
 
 
 def checked_seed(value: Any) -> int | None:
-    """Return a seed of random numbers: a whole number that is not negative, or None."""
+    """Return a seed: a whole number that is not negative, or None."""
     return None if value is None else checked_count("seed", value, least=0)
 
 
 def checked_level(value: Any, name: str = "alpha") -> float:
-    """Return a probability that lies between 0 and 1, such as the level of a test."""
+    """Return a probability between 0 and 1, such as the level of a test."""
     if not isinstance(value, numbers.Real) or isinstance(value, bool) or not 0.0 < float(value) < 1.0:
-        raise DesignError(f"{name} lies between 0 and 1, got {value!r}")
+        raise DesignError(f"{name} must be between 0 and 1, got {value!r}")
     return float(value)
 
 
 MOST = 100_000
-"""Of runs, levels, center runs, steps: more are a slip of the pen, and would fill the memory."""
+"""Limit on runs, levels, center runs and steps: more would fill the memory."""
 
 
 def checked_count(name: str, value: Any, least: int = 1, most: float = math.inf) -> int:
@@ -123,17 +111,14 @@ def checked_df(name: str, value: Any) -> float:
 
 
 def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Return values as an array of float; whether they are finite is the caller's rule.
+    """Return values as a float array; the caller checks that they are finite.
 
-    Raises
-    ------
-    DesignError
-        Masked values, dates, text, objects, complex numbers, truth values or rows of different lengths: none
-        of them is a measurement.
+    Raises DesignError: masked values, dates, text, objects, complex numbers, truth values or rows of
+    different lengths.
     """
     if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
         place = tuple(int(i) + 1 for i in np.argwhere(np.ma.getmaskarray(values))[0])
-        raise DesignError(f"{name}: a masked value is no measurement, got one at position {place}")
+        raise DesignError(f"{name} must have no masked value, got one at position {place}")
     if isinstance(values, str | bytes | dict | set) or values is None:
         raise DesignError(f"{name} must be numbers, got {values!r}")
     if getattr(getattr(values, "dtype", None), "name", "") == "category":
@@ -159,7 +144,7 @@ def checked_points(coded: ArrayLike, factor_count: int) -> NDArray[np.float64]:
     """Return coded points, shape (points, factors); one point may be given as a row of its own."""
     points = np.atleast_2d(real_array("coded points", coded))
     if points.ndim != 2 or points.shape[1] != factor_count:
-        raise DesignError(f"coded points have shape (points, {factor_count}), got {points.shape}")
+        raise DesignError(f"coded points must have shape (points, {factor_count}), got {points.shape}")
     if not np.isfinite(points).all():
-        raise DesignError(f"coded points are finite, got {points[~np.isfinite(points)][0]}")
+        raise DesignError(f"coded points must be finite, got {points[~np.isfinite(points)][0]}")
     return points

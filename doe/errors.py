@@ -1,7 +1,5 @@
 """Errors of this package: each message gives the rule, the value received and its place."""
 
-from __future__ import annotations
-
 
 class DesignError(ValueError):
     """A factor, a design or a response breaks a rule that its analysis needs."""
@@ -12,13 +10,7 @@ class TargetError(DesignError):
 
 
 class RuleError(DesignError):
-    """An input breaks a rule: ``place: problem, got value``.
-
-    Parameters
-    ----------
-    place, problem, value
-        Where, what must hold, and what was received.
-    """
+    """An input breaks a rule: ``place: problem, got value``."""
 
     def __init__(self, place: str, problem: str, value: object) -> None:
         self.place, self.problem = place, problem

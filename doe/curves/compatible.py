@@ -1,7 +1,5 @@
 """Settings that data are compatible with, drawn from a likelihood by importance and Metropolis sampling."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -22,7 +20,8 @@ WIDER = 1.5
 """Each round samples this many times as wide as the settings found scatter."""
 
 MOVES = 90
-"""Metropolis steps of each point after the rounds: they mend what importance sampling leaves at a border."""
+"""Metropolis steps of each point after the rounds; they repair what importance sampling leaves at a border.
+"""
 
 LEAST_WEIGHED = 100.0
 """Points that must count in a round: until they do, the likelihood is flattened."""
@@ -35,13 +34,13 @@ class Compatible(NamedTuple):
     """Settings that data are compatible with."""
 
     likely: Array
-    """As likely as one another, shape (POINTS, settings)."""
+    """Settings of equal weight, shape (POINTS, settings)."""
     best: Array
-    """The likeliest of all that were tried, shape (settings,)."""
+    """Setting of the highest likelihood among all that were tried, shape (settings,)."""
 
 
 def even_points(count: int, rng: np.random.Generator) -> Array:
-    """Sobol points of the design's box, of so many coded settings, shape (FIRST_POINTS, count)."""
+    """Return Sobol points of the design's box, shape (FIRST_POINTS, count)."""
     return 2.0 * qmc.Sobol(count, rng=rng).random_base2(FIRST_POINTS.bit_length() - 1) - 1.0
 
 
@@ -53,7 +52,7 @@ def compatible_points(
     Parameters
     ----------
     log_likelihood
-        Of coded settings, shape (points, settings); minus infinity outside -1 to +1.
+        Function of coded settings, shape (points, settings); minus infinity outside -1 to +1.
     first
         Points to begin with, even over the box.
 
@@ -77,7 +76,7 @@ def compatible_points(
 def _moved(
     log_likelihood: Callable[[Array], Array], points: Array, logs: Array, rng: np.random.Generator
 ) -> Compatible:
-    """Let points find their places by Metropolis steps as wide as they scatter, and finer ones in turn."""
+    """Move points by Metropolis steps as wide as they scatter, and finer ones in turn."""
     best, highest = points[int(np.argmax(logs))], float(logs.max())
     count = points.shape[1]
     for number in range(MOVES):
@@ -93,7 +92,7 @@ def _moved(
 
 
 def _flattened(logs: Array) -> Array:
-    """Weights of points, of the likelihood to the largest power at which enough of them count."""
+    """Return weights of points, from the likelihood to the largest power at which enough of them count."""
     for power in 0.5 ** np.arange(30):
         weights = np.exp(power * logs - logsumexp(power * logs))
         if 1.0 / np.sum(weights**2) >= LEAST_WEIGHED:

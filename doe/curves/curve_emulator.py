@@ -1,8 +1,8 @@
 """Emulators of curves: a simulated function of a place, as a smooth function of the settings of a model.
 
-The curves of a design are taken apart into their principal components, and the scores of each are kriged over
-the coded settings, with a linear trend and a noise that is found with them. What the components leave out
-and what kriging does not know are the emulator's own covariance.
+The curves of a design are split into principal components. The scores of each are kriged over the coded
+settings, with a linear trend and a fitted noise. The emulator's own covariance is what the components leave
+out and what kriging does not know.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from doe.numerics.one_thread import in_one_thread
 Array = NDArray[np.float64]
 
 LEAST_CURVES = 3
-"""Curves beyond the terms of a linear trend that an emulator is fitted to."""
+"""Least number of curves beyond the terms of a linear trend."""
 
 KEPT_VARIANCE = 0.999
 """Part of the curves' variance that the components hold."""
 
 MOST_COMPONENTS = 6
-"""Components at the most."""
+"""Largest number of components."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,21 +57,21 @@ class CurveEmulator:
         settings
             Coded settings of the runs, about -1 to +1, shape (runs, settings).
         curves
-            A row a run, shape (runs, places).
+            Shape (runs, places).
 
         Raises
         ------
         RuleError
-            When there are too few runs, or a value is not finite.
+            Too few runs, or a value that is not finite.
         """
         x, rows = np.array(settings, dtype=np.float64), np.array(curves, dtype=np.float64)
         if x.ndim != 2 or rows.ndim != 2 or len(x) != len(rows):
-            raise RuleError("curves", "has a row a run", f"shapes {x.shape} and {rows.shape}")
+            raise RuleError("curves", "must have a row for each run", f"shapes {x.shape} and {rows.shape}")
         least = x.shape[1] + 1 + LEAST_CURVES
         if len(x) < least:
-            raise RuleError("curves", f"needs {least} runs or more", len(x))
+            raise RuleError("curves", f"must be {least} or more", len(x))
         if not (np.isfinite(x).all() and np.isfinite(rows).all()):
-            raise RuleError("curves", "must be finite", "another number")
+            raise RuleError("curves", "must be finite", "NaN or infinity")
         mean = rows.mean(axis=0)
         _, sizes, directions = np.linalg.svd(rows - mean, full_matrices=False)
         share = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), np.finfo(float).tiny)
@@ -93,12 +93,7 @@ class CurveEmulator:
         )
 
     def scores(self, settings: ArrayLike) -> tuple[Array, Array]:
-        """Expected scores at coded settings, and the variances of what is not known of them.
-
-        Returns
-        -------
-        mean, variance : (points, components) arrays
-        """
+        """Return expected scores at coded settings and error variances, both (points, components)."""
         x = np.atleast_2d(np.asarray(settings, dtype=np.float64))
         basis = _with_constant(x)
         means = basis @ self.trends.T
@@ -109,17 +104,12 @@ class CurveEmulator:
         return means, variances
 
     def predict(self, settings: ArrayLike) -> tuple[Array, Array]:
-        """Expected curves at coded settings, and their variances without the noise of a run.
-
-        Returns
-        -------
-        mean, variance : (points, places) arrays
-        """
+        """Return expected curves and their variances without the noise of a run, both (points, places)."""
         scores, variances = self.scores(settings)
         return self.mean + scores @ self.components, variances @ self.components**2 + self.remainder
 
     def covariance(self, variances: Array, places: ArrayLike) -> Array:
-        """Covariance of the emulator at some places, given as numbers, for variances of the scores."""
+        """Return the covariance at some places, given as numbers, for variances of the scores."""
         own = self.components[:, np.asarray(places)]
         return np.asarray(own.T * variances @ own + np.diag(self.remainder[np.asarray(places)]))
 

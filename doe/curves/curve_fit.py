@@ -1,12 +1,10 @@
-"""Calibration on curves by generalised least squares, and the forecast of curves nobody has measured yet.
+"""Calibration on curves by generalised least squares, and forecasts of further curves.
 
-A measured curve is the emulated one at the true settings, plus what the model misses, plus the error of its
+A measured curve is the emulated one at the true settings, plus a miss of the model, plus the error of its
 reading (M. C. Kennedy and A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425-464). The miss is a smooth random
-function of the place and of the condition; its size and its length are those of the largest likelihood, so
-that curves which no setting meets widen the compatible region and the bands of a forecast.
+function of place and condition. Its size and length are those of the largest likelihood, so curves that no
+setting meets widen the compatible region and the bands of a forecast.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,9 +28,10 @@ class MeasuredCurve(NamedTuple):
 
     condition: str
     coordinate: float
-    """Place of the condition on a scale on which the model's miss is smooth, as the logarithm of a speed."""
+    """Place of the condition on a scale on which the model's miss is smooth, e.g. the logarithm of a speed.
+    """
     columns: NDArray[np.int_]
-    """Places of the emulator at which it was measured, as numbers."""
+    """Numbers of the emulator's places at which it was measured."""
     values: Array
     """Values there."""
 
@@ -44,25 +43,25 @@ class Miss:
     sd: float
     """Standard deviation, in the unit of the curves."""
     length: float
-    """Over which it forgets itself, in the unit of the places."""
+    """Correlation length, in the unit of the places."""
     reading: float
     """Standard deviation of the error of one reading, independent from place to place."""
     reach: float = 1.0
-    """Difference of coordinates over which conditions forget one another."""
+    """Correlation length over the coordinates of conditions."""
 
     def covariance(self, a: tuple[Array, Array], b: tuple[Array, Array]) -> Array:
-        """Covariance without the error of reading; each side has coordinates of conditions, and places."""
+        """Return the covariance without the error of reading, between two sets of coordinates and places."""
         apart = (a[0][:, None] - b[0]) / self.reach, (a[1][:, None] - b[1]) / self.length
         return np.asarray(self.sd**2 * np.exp(-0.5 * (apart[0] ** 2 + apart[1] ** 2)))
 
 
 class Forecast(NamedTuple):
-    """A curve that nobody has measured yet."""
+    """Forecast of a curve that was not measured."""
 
     expected: Array
     low: Array
     high: Array
-    """Ends of the band, in which a measured value lies with the probability asked for."""
+    """Ends of the band; a measured value is within it with the requested probability."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,17 +69,17 @@ class CurveFit:
     """Settings that measured curves are compatible with."""
 
     emulators: Mapping[str, CurveEmulator]
-    """By condition."""
+    """Emulators by condition."""
     places: Array
-    """Of the emulators' curves."""
+    """Places of the emulators' curves."""
     curves: tuple[MeasuredCurve, ...]
     miss: Miss
     settings: Array
-    """Coded settings, as likely as one another, shape (draws, settings)."""
+    """Coded settings of equal weight, shape (draws, settings)."""
     best: Array
     """Settings of the smallest chi2."""
     chi2: float
-    """At the best settings: generalised least squares of all curves."""
+    """Generalised least squares of all curves at the best settings."""
 
     @property
     def count(self) -> int:
@@ -88,7 +87,7 @@ class CurveFit:
         return sum(len(curve.values) for curve in self.curves)
 
     def residuals(self, settings: Array) -> Array:
-        """Measured less emulated values, (points, values)."""
+        """Return measured less emulated values, (points, values)."""
         return np.hstack([
             curve.values - self.emulators[curve.condition].predict(settings)[0][:, curve.columns]
             for curve in self.curves
@@ -99,8 +98,8 @@ class CurveFit:
     ) -> Forecast:
         """Forecast the curve of a condition, with the band that holds a measured value with a probability.
 
-        It spans the compatible settings, the error of the emulators, the noise of a run, what the model
-        misses there, given what it misses of the measured curves, and the error of reading.
+        The band covers the compatible settings, the error of the emulators, the noise of a run, the model's
+        miss given its misses of the measured curves, and the error of reading.
         """
         rng = np.random.default_rng(seed)
         emulator = self.emulators[condition]
@@ -131,24 +130,24 @@ def fit_curves(
     seed: int,
     free: Array | None = None,
 ) -> CurveFit:
-    """Find the settings that curves are compatible with, and what the model misses of them.
+    """Find the settings that curves are compatible with, and the model's miss of them.
 
     Parameters
     ----------
     emulators, places
         Emulators by condition, and the places of their curves.
     curves
-        Measured ones; places so near one another that their errors are the same one add nothing.
+        Measured curves; places whose errors are the same one add nothing.
     reading
         Standard deviation of the error of one reading.
     free
-        Matrix that makes the coded settings of fewer free ones, shape (settings, free ones), where some are
-        tied to one another; left out: all are free.
+        Matrix from free settings to coded settings, shape (settings, free ones), where some settings are tied
+        to one another. Default: all are free.
 
     Raises
     ------
     DesignError
-        When no curve is given, or an argument is none of these.
+        No curve, or an argument of another kind.
     """
     _check(emulators, curves)
     places, reading = real_array("places", places), checked_number("reading", reading, above=0.0)
@@ -171,14 +170,14 @@ def fit_curves(
 
 
 def _check(emulators: Mapping[str, CurveEmulator], curves: Sequence[MeasuredCurve]) -> None:
-    """Refuse what is no emulator or no measured curve, and curves of conditions that no emulator has."""
+    """Raise an error for anything but emulators and measured curves of their conditions."""
     for emulator in checked_map("emulators", emulators).values():
         checked_kind("an emulator", emulator, CurveEmulator)
     if not checked_list("curves", curves):
-        raise RuleError("curves", "needs a measured curve", "none")
+        raise RuleError("curves", "must have at least one measured curve", "an empty list")
     for curve in curves:
         if checked_kind("a measured curve", curve, MeasuredCurve).condition not in emulators:
-            raise RuleError("curves", f"are of conditions {', '.join(emulators)}", curve.condition)
+            raise RuleError("curves", f"must be of conditions {', '.join(emulators)}", curve.condition)
 
 
 def _settings_of(emulators: Mapping[str, CurveEmulator]) -> int:
@@ -186,20 +185,20 @@ def _settings_of(emulators: Mapping[str, CurveEmulator]) -> int:
 
 
 def _misses(reading: float, places: Array) -> list[Miss]:
-    """Candidates: sizes in steps of a quarter, lengths from a fortieth of the span of the places on."""
+    """Return candidates: sizes in steps of a quarter, lengths from a fortieth of the span of places."""
     span = float(np.ptp(places))
     sizes = 0.25 * reading * 1.25 ** np.arange(26)
     return [Miss(float(sd), span / part, reading) for sd in sizes for part in (40, 20, 10, 5, 2.5)]
 
 
 def _where(curves: Sequence[MeasuredCurve], places: Array) -> tuple[Array, Array]:
-    """Coordinates of conditions, and places, of all measured values."""
+    """Return coordinates of conditions, and places, of all measured values."""
     coordinates = [np.full(len(curve.values), curve.coordinate) for curve in curves]
     return np.concatenate(coordinates), np.concatenate([places[curve.columns] for curve in curves])
 
 
 def _unknown(fit: CurveFit, settings: Array) -> Array:
-    """Covariance of the error of reading and of the emulators at settings, (values, values)."""
+    """Return the covariance of the errors of reading and of the emulators at settings, (values, values)."""
     size = fit.count
     total, start = fit.miss.reading**2 * np.eye(size), 0
     for curve in fit.curves:
@@ -212,12 +211,12 @@ def _unknown(fit: CurveFit, settings: Array) -> Array:
 
 
 def _nearest(fit: CurveFit, settings: Array, miss: Miss) -> Array:
-    """Settings of the smallest chi2."""
+    """Return the settings of the smallest chi2."""
     return np.asarray(settings[int(np.argmin(_chi2(fit, settings, miss)))])
 
 
 def _likeliest(fit: CurveFit, settings: Array, misses: Sequence[Miss]) -> Miss:
-    """Miss of the largest likelihood at settings."""
+    """Return the miss of the largest likelihood at settings."""
     where, unknown = _where(fit.curves, fit.places), _unknown(fit, settings)
     residual = fit.residuals(settings)[0]
 
@@ -229,7 +228,7 @@ def _likeliest(fit: CurveFit, settings: Array, misses: Sequence[Miss]) -> Miss:
 
 
 def _chi2(fit: CurveFit, settings: Array, miss: Miss) -> Array:
-    """Generalised least squares at settings; the emulators' covariance is that at the best ones so far."""
+    """Return generalised least squares at settings, with the emulators' covariance at the best so far."""
     where = _where(fit.curves, fit.places)
     covariance = miss.covariance(where, where) + _unknown(fit, fit.best)
     residuals = fit.residuals(settings)
@@ -237,6 +236,6 @@ def _chi2(fit: CurveFit, settings: Array, miss: Miss) -> Array:
 
 
 def _log_likelihoods(fit: CurveFit, settings: Array, miss: Miss) -> Array:
-    """Logarithms of the likelihoods of settings; none outside the design."""
+    """Return log-likelihoods of settings; minus infinity outside the design."""
     inside = (np.abs(settings) <= 1.0).all(axis=1)
     return np.where(inside, -0.5 * _chi2(fit, settings, miss), -np.inf)

@@ -1,11 +1,10 @@
-"""Functions as data: profiles with their covariance, as numbers that are independent of one another.
+"""Profiles with their covariance, as numbers that are independent of one another.
 
-A fit by generalised least squares is one by ordinary least squares in the directions in which the data
-scatter independently. So each of these is a response of its own, with mean and spread, and what is made for
-responses (``joint_fit``) is made for profiles. Of all such directions those in which the settings move the
-profiles most, over their scatter, are the canonical ones: as many of them as there are settings hold all that
-a fit by generalised least squares takes from a profile that goes straight with the settings (H. Hotelling,
-Biometrika 28 (1936) 321-377).
+Generalised least squares is ordinary least squares in the directions in which the data scatter independently.
+Each direction is a response of its own, with mean and spread, so ``joint_fit`` applies to profiles as well.
+The canonical directions are those in which the settings move the profiles most, over their scatter: as many
+of them as there are settings hold all that generalised least squares takes from a profile that is linear in
+the settings (H. Hotelling, Biometrika 28 (1936) 321-377).
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from doe.numerics.shrunk_covariance import shrunk_covariance
 from doe.samples.sample import Sample
 
 LEAST_PROFILES = 3
-"""Profiles from which a scatter can be told."""
+"""Least number of profiles that shows a scatter."""
 
 LEAST_VIEWED = 2
-"""Profiles of several views from which the scatter of views can be told."""
+"""Least number of profiles of several views that shows the scatter of views."""
 
 LEAST_SPREAD = 1e-3
 """Least standard deviation of a direction, over that of the widest: rounding makes no datum exact."""
@@ -36,14 +35,14 @@ class Mode:
     """A direction in which profiles scatter independently of the other directions."""
 
     weights: NDArray[np.float64]
-    """Parts of the places in it, a unit vector, shape (places,)."""
+    """Weights of the places, a unit vector, shape (places,)."""
     target: Sample
     """Mean and spread of the profiles along it."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProfileSample:
-    """Measured profiles: heights at the same places, each profile a row."""
+    """Measured profiles: heights at the same places, one profile in each row."""
 
     mean: NDArray[np.float64]
     """Mean height of each place, shape (places,)."""
@@ -52,9 +51,9 @@ class ProfileSample:
     n: int
     """Number of profiles."""
     shrinkage: float
-    """Part of the covariance that was taken from its target: the scatter of views, or equal places."""
+    """Share of the covariance that comes from its target: the scatter of views, or equal places."""
     profiles: NDArray[np.float64] | None = None
-    """The profiles themselves, shape (profiles, places), where they are known."""
+    """Profiles themselves, shape (profiles, places); None where they are unknown."""
 
     @classmethod
     def of(cls, profiles: ArrayLike, views: ArrayLike | None = None) -> ProfileSample:
@@ -65,21 +64,17 @@ class ProfileSample:
         profiles
             Heights, shape (profiles, places).
         views
-            Covariance of single views of one profile (`scatter_of_views`), shape (places, places): the shape
-            that the covariance is shrunk to; left out: equal and independent places.
+            Covariance of single views of one profile (`scatter_of_views`), shape (places, places): the target
+            of the shrinkage (`shrunk_covariance`). Default: equal and independent places.
 
         Raises
         ------
         RuleError
-            When there are fewer than three profiles, a height is not finite, or they do not scatter.
-
-        References
-        ----------
-        O. Ledoit and M. Wolf, Journal of Multivariate Analysis 88 (2004) 365-411.
+            Fewer than three profiles, a height that is not finite, or no scatter.
         """
         rows = np.array(profiles, dtype=np.float64)
         if rows.ndim != 2 or len(rows) < LEAST_PROFILES:
-            raise RuleError("profiles", f"are rows, {LEAST_PROFILES} or more", f"shape {rows.shape}")
+            raise RuleError("profiles", f"must be {LEAST_PROFILES} rows or more", f"shape {rows.shape}")
         if not np.isfinite(rows).all():
             row = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
             raise RuleError(f"profiles[{row}]", "must be finite", rows[row].tolist())
@@ -87,7 +82,7 @@ class ProfileSample:
         # of deviations from their own mean; as many degrees of freedom as a standard deviation has
         away = (rows - mean) * np.sqrt(count / (count - 1.0))
         if not np.abs(away).max() > 0.0:
-            raise RuleError("profiles", "must scatter", "the same one each time")
+            raise RuleError("profiles", "must scatter", "the same profile each time")
         root = np.eye(rows.shape[1]) if views is None else _root(views, rows.shape[1])
         rounded = np.linalg.solve(root, away.T).T
         scale = rounded.std()
@@ -107,26 +102,26 @@ class ProfileSample:
         return tuple(found)
 
     def canonical(self, slopes: ArrayLike, count: int) -> tuple[Mode, ...]:
-        """Independent directions in which settings move profiles most, over their scatter; the best first.
+        """Return independent directions in which settings move profiles most, over their scatter.
 
-        Directions that were chosen for their small scatter look quieter than they are. So where the profiles
-        are known, each one's deviation is taken along the direction that the others would have chosen.
+        Directions that were chosen for their small scatter look quieter than they are. So each known
+        profile's deviation is taken along the direction that the other profiles choose.
 
         Parameters
         ----------
         slopes
             Change of each height with each setting, all settings in like units, shape (places, settings).
         count
-            Directions at the most; there are no more than settings, or places.
+            Largest number of directions; there are no more than settings, or places.
 
         Raises
         ------
         RuleError
-            When the slopes are not finite, not a row a place, or all zero.
+            Slopes that are not finite, have no row for each place, or are all zero.
         """
         changes = np.array(slopes, dtype=np.float64)
         if changes.ndim != 2 or len(changes) != len(self.mean) or not np.isfinite(changes).all():
-            rule = f"are finite, a row for each of {len(self.mean)} places"
+            rule = f"must be finite, with a row for each of {len(self.mean)} places"
             raise RuleError("slopes", rule, f"shape {changes.shape}")
         root = _root(self.covariance, len(self.mean))
         left, values, right = np.linalg.svd(np.linalg.solve(root, changes), full_matrices=False)
@@ -141,7 +136,7 @@ class ProfileSample:
         return tuple(found)
 
     def _spread(self, weights: NDArray[np.float64], change: NDArray[np.float64]) -> float:
-        """Standard deviation along a direction that was chosen for a change, cross-validated if possible."""
+        """Return the standard deviation along a direction chosen for a change, cross-validated."""
         if self.profiles is None or self.n <= LEAST_PROFILES:
             return float(np.sqrt(weights @ self.covariance @ weights))
         away = []
@@ -155,27 +150,24 @@ class ProfileSample:
 
 
 def scatter_of_views(heaps: Sequence[ArrayLike]) -> NDArray[np.float64] | None:
-    """Covariance of single views about the mean of their own profile, pooled over profiles.
+    """Return the covariance of single views about the mean of their own profile, pooled over profiles.
+
+    It is None if fewer than two profiles have several views, or if all views are alike.
 
     Parameters
     ----------
     heaps
         Views of each profile, each of shape (views, places).
 
-    Returns
-    -------
-    (places, places) array or None
-        None where no two profiles have several views, or these are all alike.
-
     Raises
     ------
     DesignError
-        When views are no finite numbers, or at other places than those of the first profile.
+        Views that are not finite, or at other places than those of the first profile.
     """
     profiles = [real_array("views of a profile", views) for views in checked_list("profiles", heaps)]
     for views in profiles:
         if views.ndim != 2 or views.shape[1:] != profiles[0].shape[1:] or not np.isfinite(views).all():
-            rule = "are finite, a row a view, at the places of the first profile"
+            rule = "must be finite, a row for each view, at the places of the first profile"
             raise RuleError("views", rule, f"shape {views.shape}")
     several = [views for views in profiles if len(views) > 1]
     if len(several) < LEAST_VIEWED:
@@ -189,9 +181,9 @@ def scatter_of_views(heaps: Sequence[ArrayLike]) -> NDArray[np.float64] | None:
 
 
 def _root(covariance: ArrayLike, places: int) -> NDArray[np.float64]:
-    """Root R of a covariance R R', no direction of which is quite without scatter."""
+    """Return the root R of a covariance R R', with a least scatter in every direction."""
     matrix = np.asarray(covariance, dtype=np.float64)
     if matrix.shape != (places, places) or not np.isfinite(matrix).all():
-        raise RuleError("covariance", f"is finite, of {places} places", f"shape {matrix.shape}")
+        raise RuleError("covariance", f"must be finite, of {places} places", f"shape {matrix.shape}")
     variances, directions = np.linalg.eigh(matrix)
     return np.asarray(directions * np.sqrt(np.maximum(variances, LEAST_SPREAD**2 * variances[-1])))

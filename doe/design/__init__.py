@@ -1,1 +1,1 @@
-"""Designs of experiments: factors, points, terms, and the families of designs."""
+"""Designs of experiments: factors, terms, labels, and the families of designs."""

@@ -14,10 +14,10 @@ from doe.design.labels import check_labels, in_rows
 from doe.errors import DesignError
 
 ALIAS_TOLERANCE = 1e-8
-"""Length of what a column adds to those before it, relative to its own, below which it adds nothing."""
+"""Least length of a column's addition to those before it, relative to its own length."""
 
 SAME_SETTING_DECIMALS = 9
-"""Runs whose coded settings agree to so many decimals are replicates of one setting."""
+"""Decimals up to which coded settings of replicates agree."""
 
 COLUMNS = ("df", "sum_sq", "mean_sq", "F", "p")
 
@@ -40,22 +40,18 @@ def block_numbers(blocks: pd.Series, rows: pd.Index) -> NDArray[np.intp]:
     checked_kind("blocks", blocks, pd.Series)
     if not blocks.index.equals(rows):
         if rows.has_duplicates:
-            raise DesignError("blocks have the labels of the rows, in their order where a label comes again")
+            raise DesignError("blocks must have the labels of the rows, in their order where a label repeats")
         check_labels("blocks", blocks.index, rows)
         blocks = blocks.loc[rows]
     if blocks.isna().any():
-        raise DesignError(f"blocks: row {blocks.index[blocks.isna()][0]} has none")
+        raise DesignError(f"blocks: row {blocks.index[blocks.isna()][0]} has no block")
     return pd.factorize(blocks)[0]
 
 
 def least_squares(matrix: pd.DataFrame, response: pd.Series) -> RegressionResults:
     """Return the statsmodels fit of the response on the columns of a model matrix.
 
-    Raises
-    ------
-    DesignError
-        Fewer observations than columns, a response that does not vary, or columns that are combinations of
-        others (all are named).
+    Raises DesignError: too few observations, a constant response, or dependent columns (all are named).
     """
     if len(matrix) < matrix.shape[1]:
         raise DesignError(
@@ -66,7 +62,7 @@ def least_squares(matrix: pd.DataFrame, response: pd.Series) -> RegressionResult
         raise DesignError(f"nothing to fit: all {len(response)} observations are {response.iloc[0]:g}")
     aliased = _aliased_columns(matrix)
     if aliased:
-        raise DesignError(f"the design cannot tell these terms apart: {'; '.join(aliased)}")
+        raise DesignError(f"the design cannot distinguish these terms: {'; '.join(aliased)}")
     with np.errstate(divide="ignore", invalid="ignore"):  # a saturated fit has no residual variance
         return OLS(response.to_numpy(), matrix).fit()
 
@@ -75,11 +71,11 @@ def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | Non
     """Return the spread of replicates about the mean of their setting.
 
     Rows of ``coded`` that agree (in one block, where there are blocks) are replicates of one setting; the
-    degrees of freedom are the observations less the distinct settings. A labelled response is read by the
-    labels of ``coded``, an array by its position; so are labelled blocks.
+    degrees of freedom are the observations less the distinct settings. A labelled response, and labelled
+    blocks, are read by the labels of ``coded``, an array by its position.
     """
     if not isinstance(coded, pd.DataFrame) or not len(coded.columns):
-        raise DesignError(f"pure error needs a table of settings, one row an observation, got {coded!r}")
+        raise DesignError(f"coded must be a table of settings, one row per observation, got {coded!r}")
     values = in_rows("a response", response, coded.index)
     setting = settings_of(coded)
     if blocks is not None:
@@ -90,7 +86,7 @@ def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | Non
 
 
 def settings_of(coded: pd.DataFrame) -> np.ndarray:
-    """Return for every row the number of its setting: rows that agree share it."""
+    """Return the number of every row's setting; rows that agree share it."""
     # Adding zero makes -0.0 (from rounding) the same setting as 0.0.
     return (
         coded.round(SAME_SETTING_DECIMALS)
@@ -104,7 +100,7 @@ def settings_of(coded: pd.DataFrame) -> np.ndarray:
 def block_columns(blocks: pd.Series | None, index: pd.Index) -> pd.DataFrame:
     """Return the columns of the blocks in a model: one fewer than blocks, each adding up to zero over them.
 
-    So the intercept is that of the average block. Without blocks there is no column.
+    The intercept is then that of the average block. Without blocks there is no column.
     """
     if blocks is None:
         return pd.DataFrame(index=index)
@@ -115,7 +111,7 @@ def block_columns(blocks: pd.Series | None, index: pd.Index) -> pd.DataFrame:
 
 
 def block_sum(response: pd.Series, blocks: pd.Series | None) -> ErrorTerm:
-    """Return what the blocks alone explain: the spread of their means about the overall mean."""
+    """Return the sum of squares of the blocks alone: the spread of their means about the overall mean."""
     if blocks is None:
         return ErrorTerm(0.0, 0.0)
     between = response.groupby(blocks.to_numpy()).transform("mean").to_numpy() - response.mean()
@@ -123,7 +119,7 @@ def block_sum(response: pd.Series, blocks: pd.Series | None) -> ErrorTerm:
 
 
 def partial_sums(fit: RegressionResults) -> pd.Series:
-    """Return what each column explains beyond all others: b^2 over its diagonal element of (X'X)^-1."""
+    """Return the sum of squares of each column beyond all others: b^2 over its element of (X'X)^-1."""
     return fit.params**2 / np.diag(fit.normalized_cov_params)
 
 
@@ -141,44 +137,48 @@ def anova_table(
     error: ErrorTerm | None = None,
     blocks: ErrorTerm | None = None,
 ) -> pd.DataFrame:
-    """Return the analysis of variance of a fit whose first column is the intercept and whose last are blocks.
+    """Return the analysis of variance of a fit: the intercept is its first column, the blocks its last.
 
-    Rows: blocks (where there are any: what they explain alone), model (what it explains beyond the blocks),
-    every term (partial sum of squares: types II and III of a hierarchical model in coded units),
-    residual, lack of fit (residual less pure error, tested against pure error), pure error, total (about the
-    mean). Columns: df, sum_sq, mean_sq, F, p; NaN where a row has none.
+    Rows: blocks (if any, alone), model (beyond the blocks), every term (partial sum of squares: types II and
+    III of a hierarchical model in coded units), residual, lack of fit (residual less pure error, tested
+    against pure error), pure error, total (about the mean). Columns: df, sum_sq, mean_sq, F, p; NaN where a
+    row has no such value.
 
     Parameters
     ----------
-    fit : statsmodels results
     replicates : ErrorTerm
         Pure error, from ``pure_error``.
     error : ErrorTerm, optional
-        What blocks, model and terms are tested against; default the residual.
+        Error of the tests of blocks, model and terms. Default: the residual.
     blocks : ErrorTerm, optional
         Sum of squares of the blocks, from ``block_sum``; its columns are the last of the fit.
     """
     residual = ErrorTerm(float(fit.df_resid), float(fit.ssr))
     error = residual if error is None else error
-    lack_df = residual.df - replicates.df
-    lack = ErrorTerm(lack_df, max(residual.sum_sq - replicates.sum_sq, 0.0) if lack_df > 0 else 0.0)
     blocks = blocks or ErrorTerm(0.0, 0.0)
     rows = {"blocks": (blocks, error)} if blocks.df > 0 else {}
     rows["model"] = (ErrorTerm(fit.df_model - blocks.df, float(fit.ess) - blocks.sum_sq), error)
     for name, sum_sq in partial_sums(fit).iloc[1 : len(fit.params) - int(blocks.df)].items():
         rows[str(name)] = (ErrorTerm(1.0, sum_sq), error)
-    none = ErrorTerm(0.0, 0.0)
-    rows |= {
-        "residual": (residual, none),
-        "lack of fit": (lack, replicates),
-        "pure error": (replicates, none),
-    }
-    rows["total"] = (ErrorTerm(float(fit.nobs - 1), float(fit.centered_tss)), none)
+    return with_residual(rows, fit, residual, replicates)
+
+
+def with_residual(
+    rows: dict[str, tuple[ErrorTerm, ErrorTerm]],
+    fit: RegressionResults,
+    residual: ErrorTerm,
+    replicates: ErrorTerm,
+) -> pd.DataFrame:
+    """Return the table of rows, each with its error, and of residual, lack of fit, pure error and total."""
+    no_test = ErrorTerm(0.0, 0.0)
+    df = residual.df - replicates.df
+    lack = ErrorTerm(df, max(residual.sum_sq - replicates.sum_sq, 0.0) if df > 0 else 0.0)
+    last = {"residual": (residual, no_test), "lack of fit": (lack, replicates)}
+    rows = {**rows, **last, "pure error": (replicates, no_test)}
     table = {
-        name: (row.df, row.sum_sq, row.mean_sq, *f_ratio(row, against))
-        for name, (row, against) in rows.items()
+        name: (row.df, row.sum_sq, row.mean_sq, *f_ratio(row, error)) for name, (row, error) in rows.items()
     }
-    table["total"] = (*table["total"][:2], np.nan, np.nan, np.nan)
+    table["total"] = (float(fit.nobs - 1), float(fit.centered_tss), np.nan, np.nan, np.nan)
     return pd.DataFrame.from_dict(table, orient="index", columns=list(COLUMNS)).rename_axis("source")
 
 

@@ -1,4 +1,4 @@
-"""The table of a fit's coefficients, and the analysis of variance by order of the terms."""
+"""Table of a fit's coefficients, and the analysis of variance by order of the terms."""
 
 from collections.abc import Iterable, Mapping
 
@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from statsmodels.regression.linear_model import RegressionResults
 
-from doe.design.anova import COLUMNS, ErrorTerm, f_ratio
+from doe.design.anova import ErrorTerm, with_residual
 from doe.design.polynomial_terms import Term
 
 ORDERS = ("first order", "two-way interactions", "pure quadratic", "higher order")
@@ -15,15 +15,10 @@ ORDERS = ("first order", "two-way interactions", "pure quadratic", "higher order
 def coefficient_table(fit: RegressionResults, robust: bool = False) -> pd.DataFrame:
     """Return estimate, se, t, p and vif of every coefficient.
 
-    Parameters
-    ----------
-    fit : statsmodels results
-        Of a model with an intercept in its first column, or of a mixture.
-    robust : bool
-        Standard errors that hold when the variance differs between runs (HC3: MacKinnon and White, J.
-        Econometrics 29, 1985, p. 305), instead of those of one common variance.
+    The model has an intercept in its first column, or is that of a mixture. Robust standard errors hold when
+    the variance differs between runs (HC3: MacKinnon and White, J. Econometrics 29, 1985, p. 305).
     """
-    # HC3 divides by 1 - leverage, which is 0 at a run that a term fits alone: no number there.
+    # HC3 divides by 1 - leverage, which is 0 at a run that a term fits alone
     with np.errstate(divide="ignore", invalid="ignore"):
         used = fit.get_robustcov_results("HC3", use_t=True) if robust else fit
         table = pd.DataFrame(
@@ -40,9 +35,9 @@ def coefficient_table(fit: RegressionResults, robust: bool = False) -> pd.DataFr
 
 
 def variance_inflation(fit: RegressionResults) -> np.ndarray:
-    """Return how many times its variance alone each coefficient has beside the others; NaN for an intercept.
+    """Return the factor by which the others inflate each coefficient's variance; NaN for an intercept.
 
-    1 / (1 - R2) of a column on the others, about its mean where there is an intercept.
+    It is 1 / (1 - R2) of a column on the others, about its mean where there is an intercept.
     """
     matrix = np.asarray(fit.model.exog)
     constant = np.ptp(matrix, axis=0) == 0.0
@@ -54,21 +49,13 @@ def variance_inflation(fit: RegressionResults) -> np.ndarray:
 def anova_by_order(
     fit: RegressionResults, terms: Iterable[Term], blocks: ErrorTerm, replicates: ErrorTerm
 ) -> pd.DataFrame:
-    """Return the analysis of variance by order: what each kind of terms adds to those before it.
+    """Return the analysis of variance by order: the addition of each order of terms to those before it.
 
-    Rows: blocks (where there are any), first order, two-way interactions, pure quadratic, higher order (those
-    that the model has), residual, lack of fit, pure error, total. Each order is tested against the residual.
-    The sums of squares are sequential, as in R's ``rsm``: where the orders are not orthogonal to one another
-    (a composite design's squares are to the rest) what an order adds depends on what came before.
-
-    Parameters
-    ----------
-    fit : statsmodels results
-        Columns: intercept, the terms, the blocks.
-    terms : sequence of terms
-        As the fit has them.
-    blocks, replicates : ErrorTerm
-        From ``block_sum`` and ``pure_error``.
+    Rows: blocks (if any), first order, two-way interactions, pure quadratic, higher order (those that the
+    model has), residual, lack of fit, pure error, total. Each order is tested against the residual. The sums
+    of squares are sequential, as in R's ``rsm``: where the orders are not orthogonal (a composite design's
+    squares and the rest), an order's addition depends on those before it. The columns of the fit are
+    intercept, terms, blocks.
     """
     matrix, response = np.asarray(fit.model.exog), np.asarray(fit.model.endog)
     written = list(terms)
@@ -85,19 +72,7 @@ def anova_by_order(
             remaining = _residual_sum(matrix[:, inside], response)
             rows[order] = (ErrorTerm(float(len(places)), left - remaining), residual)
             left = remaining
-    none = ErrorTerm(0.0, 0.0)
-    lack_df = residual.df - replicates.df
-    lack = ErrorTerm(lack_df, max(residual.sum_sq - replicates.sum_sq, 0.0) if lack_df > 0 else 0.0)
-    rows |= {
-        "residual": (residual, none),
-        "lack of fit": (lack, replicates),
-        "pure error": (replicates, none),
-    }
-    table = {
-        name: (row.df, row.sum_sq, row.mean_sq, *f_ratio(row, error)) for name, (row, error) in rows.items()
-    }
-    table["total"] = (float(fit.nobs - 1), float(fit.centered_tss), np.nan, np.nan, np.nan)
-    return pd.DataFrame.from_dict(table, orient="index", columns=list(COLUMNS)).rename_axis("source")
+    return with_residual(rows, fit, residual, replicates)
 
 
 def _order(term: Term) -> str:
@@ -117,7 +92,7 @@ def _residual_sum(matrix: np.ndarray, response: np.ndarray) -> float:
 def summary_text(
     title: str, coefficients: pd.DataFrame, anova: pd.DataFrame | None, facts: Mapping[str, object]
 ) -> str:
-    """Return a report of a fit in plain text: coefficients, analysis of variance, what is to know."""
+    """Return a report of a fit in plain text: coefficients, analysis of variance, facts."""
 
     def number(value: float) -> str:
         return "" if np.isnan(value) else f"{value:.5g}"

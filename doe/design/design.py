@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from doe.arguments import (
     checked_flag,
@@ -20,7 +20,6 @@ from doe.arguments import (
 )
 from doe.design.factors import Category, Factor, checked_factors
 from doe.design.labels import aligned
-from doe.design.points import coded_points, natural_points
 from doe.errors import DesignError
 
 
@@ -30,18 +29,17 @@ class Design:
 
     Parameters
     ----------
-    factors : tuple of Factor
-    coded : DataFrame, one row a run
+    coded : DataFrame, one row per run
         Coded settings: a column for each factor and each dummy, by name. The index holds the runs' labels.
     seed : int, optional
-        Seed of ``run_order``; None keeps the standard order.
+        Seed of ``run_order``. Default: the standard order.
     dummies : names
-        Columns of a screening design that stand for no factor and hold -1 and +1: what they estimate is error
-        and interactions. A column is a dummy because it is named here, never by its values.
+        Columns of a screening design for no factor, of -1 and +1: their effects estimate error and
+        interactions. A column is a dummy by this list, never by its values.
     blocks : Series, optional
         Label of each run's block (day, batch, oven), by run. Blocks are a term of every model of the design.
     notes : sentences
-        What whoever uses the design should know: what it mixes up, which design does better.
+        Remarks for the user: aliases, better designs.
     """
 
     factors: tuple[Factor, ...]
@@ -62,9 +60,8 @@ class Design:
             odd = coded.index[~(coded[name].isin([-1.0, 1.0]) | center)]
             if len(odd):
                 raise DesignError(
-                    f"a dummy holds only -1 and +1 (0 at the center): column {name!r} holds "
-                    f"{coded.loc[odd[0], name]} "
-                    f"in run {odd[0]}"
+                    f"a dummy must hold only -1 and +1 (0 at the center): column {name!r} holds "
+                    f"{coded.loc[odd[0], name]} in run {odd[0]}"
                 )
         object.__setattr__(self, "factors", factors)
         object.__setattr__(self, "coded", coded)
@@ -93,33 +90,31 @@ class Design:
         dummies: Iterable[str] = (),
         block: str | None = None,
     ) -> "Design":
-        """Return the design that a table holds.
+        """Return the design of a table.
 
         Parameters
         ----------
-        table : DataFrame, one row a run
+        table : DataFrame, one row per run
             A column for each factor, each dummy and the blocks; no other.
-        factors : iterable of Factor
         coded : bool, optional
-            Whether the factors' columns are coded (else in natural units). By default they are taken as coded
-            where that is plain: each factor's column holds -1 and +1.
+            True if the factors' columns are coded, False if they are in natural units. By default they are
+            taken as coded where that is unambiguous: each factor's column holds -1 and +1.
         dummies : names
-            Columns in -1 and +1 that stand for no factor.
+            Columns in -1 and +1 for no factor.
         block : name, optional
-            Column that holds the blocks' labels.
+            Column of the blocks' labels.
 
         Raises
         ------
         DesignError
-            A factor without column, a column that is nothing of the three, a value that is not finite, a run
-            label that comes twice, a dummy with other values than -1 and +1, or a table of which it is not
-            plain whether it is coded.
+            A factor without column, an unknown column, a value that is not finite, a repeated run label, a
+            dummy with other values than -1 and +1, or a table that may be coded or natural.
         """
         factors, dummies = checked_factors(factors), tuple(checked_list("dummies", dummies))
         if coded is not None:
             checked_flag("coded, unless it is None,", coded)
         if not isinstance(table, pd.DataFrame):
-            raise DesignError(f"a design is made from a DataFrame, got {type(table).__name__}")
+            raise DesignError(f"table must be a DataFrame, got {type(table).__name__}")
         blocks = None
         if block is not None:
             if not isinstance(block, str) or block not in table.columns:
@@ -158,16 +153,16 @@ class Design:
     def factor(self, name: str) -> Factor:
         """Return the factor of this name."""
         if not isinstance(name, str):
-            raise DesignError(f"a factor is named by text, got {name!r}")
+            raise DesignError(f"a factor's name must be text, got {name!r}")
         for factor in self.factors:
             if factor.name == name:
                 return factor
         raise DesignError(f"no factor is named {name!r}; the design has {', '.join(self.names)}")
 
     def select(self, runs: Sequence) -> "Design":
-        """Return a design of these runs, renumbered from 1; a label that comes again is a replicate.
+        """Return a design of these runs, renumbered from 1; a repeated label is a replicate.
 
-        So a table of finished cases, some replicated and some missing, becomes a design again:
+        It makes a design of a table of finished cases, some replicated, some missing:
         ``design.select(table["run"])``.
         """
         runs = checked_list("runs", runs)
@@ -182,9 +177,21 @@ class Design:
         """Return the design with these blocks: a label for each run, in the order of the runs."""
         labels = checked_list("blocks", labels)
         if len(labels) != len(self.coded):
-            raise DesignError(f"blocks: one label for each of {len(self.coded)} runs, got {len(labels)}")
+            raise DesignError(
+                f"blocks must be one label for each of {len(self.coded)} runs, got {len(labels)}"
+            )
         blocks = pd.Series(labels, index=self.coded.index)
         return replace(self, blocks=blocks)
+
+
+def design_of_blocks(
+    factors: tuple[Factor, ...], parts: Sequence[NDArray[np.float64]], seed: int | None
+) -> Design:
+    """Return the design of coded runs in parts, which are blocks if there are several."""
+    table = numbered(pd.DataFrame(np.vstack(parts), columns=[factor.name for factor in factors]))
+    labels = np.repeat(range(1, len(parts) + 1), [len(part) for part in parts])
+    blocks = pd.Series(labels, index=table.index) if len(parts) > 1 else None
+    return Design(factors, table, seed, blocks=blocks)
 
 
 def numbered(table: pd.DataFrame) -> pd.DataFrame:
@@ -193,25 +200,17 @@ def numbered(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.Series]:
-    """Return coded settings and response with one row an observation.
+    """Return coded settings and response with one row per observation.
 
-    Parameters
-    ----------
-    design : Design
-    response : array-like, shape (runs,) or (runs, replicates)
-        A Series or DataFrame is read by its labels, which are the design's runs in any order; an array by its
-        position, in the design's row order. Columns of a DataFrame are replicates and are numbered.
-
-    Raises
-    ------
-    DesignError
-        Other labels, another shape, or a value that is not finite (with its run and replicate).
+    A Series or DataFrame is read by its labels, which are the design's runs in any order; an array by its
+    position, in the design's row order. Columns of a DataFrame are replicates and are numbered. Raises
+    DesignError: other labels, another shape, or a value that is not finite (with its run and replicate).
     """
     checked_kind("design", design, Design)
     values = aligned("a response", response, design.coded.index)
     runs = len(design.coded)
     if values.ndim not in (1, 2) or values.shape[0] != runs or values.size == 0:
-        raise DesignError(f"a response has shape ({runs},) or ({runs}, replicates), got {values.shape}")
+        raise DesignError(f"a response must have shape ({runs},) or ({runs}, replicates), got {values.shape}")
     values = values.reshape(runs, -1)
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
@@ -225,18 +224,24 @@ def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.
     return coded, pd.Series(values.ravel(), index=coded.index, name="response")
 
 
-def checked_setting(name: str, point: Any, design: Design) -> dict[str, Any]:
-    """Return the natural settings of a design's factors; raise DesignError when one is missing or wrong."""
+def checked_setting(name: str, point: Any, factors: Iterable[Factor]) -> dict[str, Any]:
+    """Return the natural settings of factors; raise DesignError when one is missing or wrong."""
     given = checked_map(name, point)
-    missing = [factor.name for factor in design.factors if factor.name not in given]
+    missing = [factor.name for factor in factors if factor.name not in given]
     if missing:
         raise DesignError(f"no value for factor {missing[0]!r} in {name}: {given}")
-    for factor in design.factors:
+    for factor in factors:
         if isinstance(factor, Category):
             factor.to_coded(given[factor.name])
         else:
             checked_number(f"the value of {factor.name!r} in {name}", given[factor.name])
-    return {factor.name: given[factor.name] for factor in design.factors}
+    return {factor.name: given[factor.name] for factor in factors}
+
+
+def coded_setting(name: str, point: Any, factors: Sequence[Factor]) -> NDArray[np.float64]:
+    """Return coded settings of factors that are numbers; raise DesignError when one is missing or wrong."""
+    given = checked_setting(name, point, factors)
+    return np.array([float(factor.to_coded(given[factor.name])) for factor in factors])
 
 
 def checked_blocks(blocks: pd.Series, coded: pd.DataFrame) -> pd.Series:
@@ -246,10 +251,12 @@ def checked_blocks(blocks: pd.Series, coded: pd.DataFrame) -> pd.Series:
         or not blocks.index.is_unique
         or set(blocks.index) != set(coded.index)
     ):
-        raise DesignError("blocks: a Series with a label for each run of the design, by the runs' labels")
+        raise DesignError(
+            "blocks must be a Series with a label for each run of the design, by the runs' labels"
+        )
     blocks = blocks.loc[coded.index].rename("block")
     if blocks.isna().any():
-        raise DesignError(f"blocks: run {blocks.index[blocks.isna()][0]} has none")
+        raise DesignError(f"blocks: run {blocks.index[blocks.isna()][0]} has no block")
     names = {f"block {label}" for label in blocks.unique()} & set(coded.columns)
     if names:
         raise DesignError(f"{min(names)!r} names a block's column in the model: give the factor another name")
@@ -257,18 +264,18 @@ def checked_blocks(blocks: pd.Series, coded: pd.DataFrame) -> pd.Series:
 
 
 def _check_coded(design: Design) -> None:
-    """Raise DesignError unless it is plain that a table's factors are coded."""
+    """Raise DesignError unless it is clear that a table's factors are coded."""
     for factor in design.factors:
         values = design.coded[factor.name].to_numpy()
         if isinstance(factor, Category):
-            continue  # the names of levels are no numbers
+            continue  # its levels are names
         coded, natural = (
             all(np.isclose(values, end, rtol=1e-9, atol=1e-9 * factor.half_range).any() for end in ends)
             for ends in ((-1.0, 1.0), (factor.low, factor.high))
         )
         if not coded or (natural and (factor.low, factor.high) != (-1.0, 1.0)):
             raise DesignError(
-                f"it is not plain whether the table is coded or in natural units: factor {factor.name!r} has "
+                f"it is not clear whether the table is coded or in natural units: factor {factor.name!r} has "
                 f"the levels {factor.low:g} and {factor.high:g}, its column runs from {values.min():g} to "
                 f"{values.max():g}; say coded=False (natural units) or coded=True"
             )
@@ -288,21 +295,21 @@ def _checked_natural(table: pd.DataFrame, factors: tuple[Factor, ...]) -> pd.Dat
 
 
 def _checked_table(table: pd.DataFrame, names: list[str], dummies: tuple[str, ...]) -> pd.DataFrame:
-    """Return a float copy with the factors' columns first; raise DesignError when it is no table of runs."""
+    """Return a float copy with the factors' columns first; raise DesignError for an invalid table."""
     for what, wanted in (("factor", names), ("dummy", dummies)):
         missing = [name for name in wanted if name not in table.columns]
         if missing:
             raise DesignError(f"no column for {what} {missing[0]!r}; the table has {list(table.columns)}")
     for what, labels in (("run label", table.index), ("column", table.columns)):
         if labels.has_duplicates:
-            raise DesignError(f"each {what} comes once, got again: {labels[labels.duplicated()][0]}")
+            raise DesignError(f"each {what} must come once, got again: {labels[labels.duplicated()][0]}")
     if table.empty:
-        raise DesignError("a design has at least one run, got an empty table")
-    strangers = [name for name in table.columns if name not in (*names, *dummies)]
-    if strangers:
+        raise DesignError("a design must have at least one run, got an empty table")
+    unknown = [name for name in table.columns if name not in (*names, *dummies)]
+    if unknown:
         raise DesignError(
-            f"column {strangers[0]!r} is no factor: name it among the dummies (dummies=[...]), as the block "
-            f"(block={strangers[0]!r}), or drop it"
+            f"column {unknown[0]!r} is no factor: name it among the dummies (dummies=[...]), as the block "
+            f"(block={unknown[0]!r}), or drop it"
         )
     if set(names) & set(dummies):
         raise DesignError(
@@ -322,3 +329,13 @@ def _checked_table(table: pd.DataFrame, names: list[str], dummies: tuple[str, ..
             f"column {table.columns[column]!r}"
         )
     return table
+
+
+def natural_points(factors: Iterable[Factor], coded: pd.DataFrame) -> pd.DataFrame:
+    """Return the natural values of coded points: columns are the factors' names, same index."""
+    return pd.DataFrame({f.name: f.to_natural(coded[f.name]) for f in factors}, index=coded.index)
+
+
+def coded_points(factors: Iterable[Factor], natural: pd.DataFrame) -> pd.DataFrame:
+    """Return the coded values of natural points: columns are the factors' names, same index."""
+    return pd.DataFrame({f.name: f.to_coded(natural[f.name]) for f in factors}, index=natural.index)

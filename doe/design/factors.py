@@ -1,4 +1,4 @@
-"""Factors: parameters that a design varies, with the coding between natural units and -1..+1."""
+"""Factors: parameters that a design varies, with their coding between natural units and -1..+1."""
 
 import math
 import numbers
@@ -18,7 +18,7 @@ Values = TypeVar("Values", float, np.ndarray, "pd.Series")
 RESERVED_NAMES = frozenset(
     {"intercept", "blocks", "curvature", "model", "residual", "lack of fit", "pure error", "total"}
 )
-"""Rows of the analysis tables: a factor of that name could not be told from them."""
+"""Names of rows of the analysis tables, which no factor may have."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,11 @@ class Factor:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
-            raise DesignError(f"a factor's name is text, got {self.name!r}")
+            raise DesignError(f"a factor's name must be text, got {self.name!r}")
         if not self.name or self.name != self.name.strip() or set(self.name) & set(":^"):
-            raise DesignError(f"a factor's name is not empty, has no outer blanks, ':' or '^': {self.name!r}")
+            raise DesignError(
+                f"a factor's name must not be empty or have outer blanks, ':' or '^', got {self.name!r}"
+            )
         if self.name in RESERVED_NAMES:
             raise DesignError(
                 f"{self.name!r} names a row of the analysis tables: give the factor another name"
@@ -78,7 +80,7 @@ class Factor:
 
     @property
     def levels_text(self) -> str:
-        """Both levels and the unit, for a heading: ``150..170 degC``."""
+        """Levels and unit, for a heading: ``150..170 degC``."""
         return f"{self.low:g}..{self.high:g}{'' if self.unit in ('', '1') else ' ' + self.unit}"
 
     def to_natural(self, coded: Values) -> Values:
@@ -94,12 +96,11 @@ class Factor:
 class Category(Factor):
     """A factor whose levels are names: a variety, a supplier, an operator.
 
-    Two levels are coded -1 and +1, as those of a number; more are coded 0, 1, 2, ..., which numbers them and
-    means no more, so that a polynomial refuses them and a formula (``doe.fit_formula``) takes their names.
+    Two levels are coded -1 and +1, as those of a number; more are numbered 0, 1, 2, ..., so that a polynomial
+    rejects them and a formula (``doe.fit_formula``) takes their names.
 
     Parameters
     ----------
-    name : str
     levels : sequence of str
         Two or more, all different.
     """
@@ -113,7 +114,7 @@ class Category(Factor):
         super().__post_init__()
         levels = tuple(self.levels) if isinstance(self.levels, Iterable) else ()
         if isinstance(self.levels, str) or len(levels) < 2 or len(set(levels)) < len(levels):
-            raise DesignError(f"category {self.name!r}: two or more different levels, got {self.levels!r}")
+            raise DesignError(f"category {self.name!r} must have two or more levels, got {self.levels!r}")
         object.__setattr__(self, "levels", levels)
 
     @property
@@ -131,13 +132,13 @@ class Category(Factor):
         return self._translated(coded, dict(zip(self.codes, self.levels, strict=True)))
 
     def to_coded(self, natural: Any) -> Any:
-        """Return the coded values of levels' names; raise DesignError for a name that is no level."""
+        """Return the coded values of levels' names; raise DesignError for an unknown name."""
         return self._translated(natural, dict(zip(self.levels, self.codes, strict=True)))
 
     def _translated(self, values: Any, table: dict) -> Any:
-        strangers = [value for value in np.ravel(values) if value not in table]
-        if strangers:
-            raise DesignError(f"category {self.name!r} has the levels {list(table)}, got {strangers[0]!r}")
+        unknown = [value for value in np.ravel(values) if value not in table]
+        if unknown:
+            raise DesignError(f"category {self.name!r} must be one of {list(table)}, got {unknown[0]!r}")
         if hasattr(values, "map"):  # a column of a table
             return values.map(table)
         found = np.array([table[value] for value in np.ravel(values)])
@@ -149,7 +150,7 @@ def numeric_factors(factors: Iterable[Factor], what: str) -> tuple[Factor, ...]:
     factors = checked_factors(factors)
     for factor in factors:
         if isinstance(factor, Category):
-            raise DesignError(f"{what} takes factors that are numbers; {factor.name!r} is a category")
+            raise DesignError(f"{what} needs factors that are numbers; {factor.name!r} is a category")
     return factors
 
 
@@ -166,15 +167,15 @@ def two_level_factors(factors: Iterable[Factor], what: str) -> tuple[Factor, ...
 
 
 def checked_factors(factors: Iterable[Factor]) -> tuple[Factor, ...]:
-    """Return the factors as a tuple; raise DesignError when empty, no factors, or when a name comes twice."""
+    """Return factors as a tuple; raise DesignError for an empty list, other values or a repeated name."""
     if not isinstance(factors, Iterable) or isinstance(factors, str | bytes):
-        raise DesignError(f"factors is a list of Factor or Category, got {factors!r}")
+        raise DesignError(f"factors must be a list of Factor or Category, got {factors!r}")
     factors = tuple(factors)
     for factor in factors:
         if not isinstance(factor, Factor | Category):
-            raise DesignError(f"factors is a list of Factor or Category, got {factor!r} in it")
+            raise DesignError(f"factors must be a list of Factor or Category, got {factor!r} in it")
     if not factors:
-        raise DesignError("a design needs at least one factor, got none")
+        raise DesignError("factors must be one or more, got an empty list")
     names = [factor.name for factor in factors]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:

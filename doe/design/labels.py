@@ -14,21 +14,11 @@ from doe.errors import DesignError
 def aligned(name: str, values: ArrayLike, labels: pd.Index) -> NDArray[np.float64]:
     """Return values in the order of some labels, shape (labels,) or (labels, columns).
 
-    Parameters
-    ----------
-    name : str
-        What the values are, for the error.
-    values : array-like
-        A Series or DataFrame is put in order by its index, which holds the same labels, each once. Anything
-        else is in that order already.
-    labels : Index
-        The order.
+    A Series or DataFrame is sorted by its index, which holds the same labels, each once. Other values are in
+    that order already.
 
-    Raises
-    ------
-    DesignError
-        Other labels, a label that comes twice, several columns that are not numbered as replicates are, or
-        values that are no numbers.
+    Raises DesignError: other labels, a repeated label, several columns that are not numbered as replicates
+    are, or values that are no numbers.
     """
     if isinstance(values, pd.Series | pd.DataFrame):
         if isinstance(values, pd.DataFrame):
@@ -39,10 +29,10 @@ def aligned(name: str, values: ArrayLike, labels: pd.Index) -> NDArray[np.float6
 
 
 def in_rows(name: str, values: ArrayLike, rows: pd.Index) -> pd.Series:
-    """Return values as a Series with these row labels, finite, one a row.
+    """Return values as a Series with these row labels, finite, one per row.
 
-    A Series with the same labels in another order is put in order; labels may repeat where the order is the
-    same already, as those of replicated runs do.
+    A Series with the same labels in another order is sorted; labels may repeat where the order is the same
+    already, as those of replicated runs do.
     """
     if isinstance(values, pd.Series | pd.DataFrame) and not values.index.equals(rows):
         if rows.has_duplicates:
@@ -54,7 +44,9 @@ def in_rows(name: str, values: ArrayLike, rows: pd.Index) -> pd.Series:
     else:
         numbers = real_array(name, values)
     if numbers.shape != (len(rows),):
-        raise DesignError(f"{name} is one number a row of {len(rows)}, got shape {numbers.shape}")
+        raise DesignError(
+            f"{name} must be one number for each of {len(rows)} rows, got shape {numbers.shape}"
+        )
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         raise DesignError(f"{name} must be finite: {numbers[bad[0]]} in row {_text(rows[bad[0]])}")
@@ -75,7 +67,7 @@ def check_labels(name: str, received: pd.Index, labels: pd.Index) -> None:
         if len(other):
             raise DesignError(
                 f"{name} is labelled and aligns by label: it {problem} {_text(other[0])} "
-                f"{'of' if problem == 'lacks' else 'beside'} the labels {_listed(labels)}; {by_position}"
+                f"{'of' if problem == 'lacks' else 'besides'} the labels {_listed(labels)}; {by_position}"
             )
 
 
@@ -90,13 +82,10 @@ def check_replicates(name: str, table: pd.DataFrame) -> None:
 
 
 def same_labels(names: Sequence[str], tables: Sequence[Any]) -> list[Any]:
-    """Return arguments of one length, those that are labelled in the order of the first labelled one.
+    """Return arguments of one length, the labelled ones in the order of the first of them.
 
-    Raises
-    ------
-    DesignError
-        Two labelled arguments with other labels, or a label that comes twice in an argument whose order
-        differs.
+    Raises DesignError: two arguments with other labels, or a repeated label in an argument whose order
+    differs.
     """
     kept = [(name, table) for name, table in zip(names, tables, strict=True) if isinstance(table, pd.Series)]
     if not kept:

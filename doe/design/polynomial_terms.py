@@ -17,7 +17,7 @@ Term = tuple[str, ...]
 INTERCEPT: Term = ()
 HIGHEST_POWER = 4
 MOST_DIGITS = 17
-"""Digits behind the point of a written coefficient."""
+"""Largest number of digits of a written coefficient."""
 
 MODELS = ("first-order", "interaction", "quadratic", "three-factor")
 
@@ -39,28 +39,25 @@ def model_terms(names: Sequence[str], model: str) -> tuple[Term, ...]:
 
 
 def parsed_terms(written: Iterable[str], names: Sequence[str]) -> tuple[Term, ...]:
-    """Return the terms that are written, in the order of a polynomial: ``["A", "B", "A:B", "A^2", "A:B:C"]``.
+    """Return written terms, in the order of a polynomial: ``["A", "B", "A:B", "A^2", "A:B:C"]``.
 
-    Raises
-    ------
-    DesignError
-        A factor that is none of ``names``, a term that comes twice, or one whose parts are not all there: the
-        model is hierarchical.
+    Raises DesignError: an unknown factor, a repeated term, or one whose parts are not all present: the model
+    is hierarchical.
     """
     terms: list[Term] = []
     for text in checked_list("model, unless it is a name,", written):
         if not isinstance(text, str):
-            raise DesignError(f"a term is text such as 'A:B' or 'A^2', got {text!r}")
+            raise DesignError(f"a term must be text such as 'A:B' or 'A^2', got {text!r}")
         base, power, degree = text.partition("^")
         parts = [part.strip() for part in base.split(":")]
         if power:
             if len(parts) > 1 or not degree.strip().isdigit() or not 2 <= int(degree) <= HIGHEST_POWER:
-                raise DesignError(f"a term is a product or one power, such as A:B or A^2, got {text!r}")
+                raise DesignError(f"a term must be a product or one power, such as A:B or A^2, got {text!r}")
             parts *= int(degree)
-        strangers = [part for part in parts if part not in names]
-        if strangers:
+        unknown = [part for part in parts if part not in names]
+        if unknown:
             raise DesignError(
-                f"term {text!r}: no factor is named {strangers[0]!r}; there are {', '.join(names)}"
+                f"term {text!r}: no factor is named {unknown[0]!r}; there are {', '.join(names)}"
             )
         term = tuple(sorted(parts, key=list(names).index))
         if term in terms:
@@ -75,16 +72,16 @@ def parsed_terms(written: Iterable[str], names: Sequence[str]) -> tuple[Term, ..
 
 
 def term_name(term: Term) -> str:
-    """Return the written term: ``intercept``, ``E``, ``E:F``, ``E^2`` or ``E:F:G``."""
+    """Return the name of a term: ``intercept``, ``E``, ``E:F``, ``E^2`` or ``E:F:G``."""
     if term == INTERCEPT:
         return "intercept"
     return f"{term[0]}^{len(term)}" if len(term) > 1 and len(set(term)) == 1 else ":".join(term)
 
 
 def find_term(name: str, terms: Iterable[Term]) -> Term:
-    """Return the term that a name writes (interactions in either order); raise DesignError when none does."""
+    """Return the term of a name (interactions in either order); raise DesignError for an unknown name."""
     if not isinstance(name, str):
-        raise DesignError(f"a term is named by text such as 'E', 'E:F' or 'E^2', got {name!r}")
+        raise DesignError(f"a term's name must be text such as 'E', 'E:F' or 'E^2', got {name!r}")
     for term in terms:
         if name == term_name(term) or sorted(str(name).split(":")) == sorted(term):
             return term
@@ -92,7 +89,7 @@ def find_term(name: str, terms: Iterable[Term]) -> Term:
 
 
 def contains(term: Term, part: Term) -> bool:
-    """Tell if a term is a multiple of another one: "E:F" and "E^2" contain "E"."""
+    """Return True if a term is a multiple of another one: "E:F" and "E^2" contain "E"."""
     return term != part and all(term.count(name) >= part.count(name) for name in part)
 
 
@@ -107,8 +104,8 @@ def model_matrix(coded: pd.DataFrame, terms: Iterable[Term]) -> pd.DataFrame:
 def natural_coefficients(coded: Mapping[Term, float], factors: Iterable[Factor]) -> dict[Term, float]:
     """Return a coded polynomial's coefficients in natural units.
 
-    Each coded variable is (natural - center) / half range; every product is multiplied out. The terms come in
-    the order of the coded ones; a linear term that the coded model lacks may come in behind them.
+    Each coded variable is (natural - center) / half range; every product is multiplied out. The terms keep
+    the order of the coded ones; linear terms that the coded model lacks follow.
     """
     by_name = {factor.name: factor for factor in factors}
     natural: dict[Term, float] = defaultdict(float, dict.fromkeys(coded, 0.0))

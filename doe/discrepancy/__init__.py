@@ -1,13 +1,13 @@
-"""Discrepancy between a simulator and measurements: is something missing from the model, and what?
+"""Discrepancy between a simulator and measurements, and the effect that the model lacks.
 
 A simulator answers points with observables. It has factors, which every calibration adjusts, and mechanisms,
 which it may have beyond its base model; it is run under several conditions. Given measured replicates, an
-analysis calibrates the base, tests what is left against the noise, lets the mechanisms compete to explain it
-with fresh runs of the simulator, and names one where the data tell it from every other.
+analysis calibrates the base, tests the residuals against the noise, lets the mechanisms compete to explain
+them with fresh runs of the simulator, and names one where the data distinguish it from every other.
 
-The folders stand in the order of use: `problem` (what varies, what was measured, the rules), `emulation` (a
-bank of runs and the emulator fitted to it), `fitting`, `contest`, `verdict`. `analyse` is the whole, as a
-generator of the runs that it wants; `drive` answers it.
+The folders are in the order of use: `problem` (ranges, measured data, rules), `emulation` (a bank of runs and
+the emulator fitted to it), `fitting`, `contest`, `verdict`. `analyse` is the whole, as a generator of the
+runs that it needs; `drive` answers it.
 
 >>> import numpy as np
 >>> def run(point):  # two factors, two conditions, one mechanism

@@ -1,66 +1,38 @@
 """The public names: each is loaded with its module when it is first used."""
 
-from .analysis import Analysis, analyse, drive
-from .contest.gap import Answer, Question
-from .contest.power import Power
-from .contest.slips import Slip
-from .emulation.bank import Bank, bank_points, load_bank, make_bank
-from .emulation.emulator import Emulator, fit_emulator, fitted
-from .fitting.model_fit import Interval
-from .problem.outcomes import Outcomes, Point, Simulator
-from .problem.replicates import Calibration, Measured
-from .problem.settings import Settings, settings_of
-from .problem.space import MechanismRange, SearchSpace
-from .verdict.before_after import BeforeAfter
-from .verdict.discovery import (
-    CalibrationUse,
-    Candidate,
-    Confounding,
-    Data,
-    Discovery,
-    Drift,
-    Effort,
-    Fit,
-    Gap,
-    Verdict,
-)
-from .verdict.next_experiment import NextExperiment
-
-__all__ = [
-    "Analysis",
-    "Answer",
-    "Bank",
-    "BeforeAfter",
-    "Calibration",
-    "CalibrationUse",
-    "Candidate",
-    "Confounding",
-    "Data",
-    "Discovery",
-    "Drift",
-    "Effort",
-    "Emulator",
-    "Fit",
-    "Gap",
-    "Interval",
-    "Measured",
-    "MechanismRange",
-    "NextExperiment",
-    "Outcomes",
-    "Point",
-    "Power",
-    "Question",
-    "SearchSpace",
-    "Settings",
-    "Simulator",
-    "Slip",
-    "Verdict",
-    "analyse",
-    "bank_points",
-    "drive",
-    "fit_emulator",
-    "fitted",
-    "load_bank",
-    "make_bank",
-    "settings_of",
-]
+from .analysis import Analysis as Analysis
+from .analysis import analyse as analyse
+from .analysis import drive as drive
+from .contest.gap import Answer as Answer
+from .contest.gap import Question as Question
+from .contest.power import Power as Power
+from .contest.slips import Slip as Slip
+from .emulation.bank import Bank as Bank
+from .emulation.bank import bank_points as bank_points
+from .emulation.bank import load_bank as load_bank
+from .emulation.bank import make_bank as make_bank
+from .emulation.emulator import Emulator as Emulator
+from .emulation.emulator import fit_emulator as fit_emulator
+from .emulation.emulator import fitted as fitted
+from .fitting.model_fit import Interval as Interval
+from .problem.outcomes import Outcomes as Outcomes
+from .problem.outcomes import Point as Point
+from .problem.outcomes import Simulator as Simulator
+from .problem.replicates import Calibration as Calibration
+from .problem.replicates import Measured as Measured
+from .problem.settings import Settings as Settings
+from .problem.settings import settings_of as settings_of
+from .problem.space import MechanismRange as MechanismRange
+from .problem.space import SearchSpace as SearchSpace
+from .verdict.before_after import BeforeAfter as BeforeAfter
+from .verdict.discovery import CalibrationUse as CalibrationUse
+from .verdict.discovery import Candidate as Candidate
+from .verdict.discovery import Confounding as Confounding
+from .verdict.discovery import Data as Data
+from .verdict.discovery import Discovery as Discovery
+from .verdict.discovery import Drift as Drift
+from .verdict.discovery import Effort as Effort
+from .verdict.discovery import Fit as Fit
+from .verdict.discovery import Gap as Gap
+from .verdict.discovery import Verdict as Verdict
+from .verdict.next_experiment import NextExperiment as NextExperiment

@@ -1,7 +1,7 @@
-"""The whole analysis of measured data: is something missing from the model, and what?
+"""Analysis of measured data: it finds an effect that the model lacks.
 
-It is a generator. It yields waves of points, is sent their outcomes, and returns what it found; so one can be
-run with any simulator, and hundreds side by side with all their waves in one batch.
+It is a generator: it yields batches of points, is sent their outcomes, and returns its findings. So it runs
+with any simulator, and hundreds run together with all their points in one batch.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from functools import partial
 
 import numpy as np
 
-from doe.discrepancy.contest.fresh_runs import Laboratory, Request
+from doe.discrepancy.contest.fresh_runs import FreshRuns, Request
 from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, Question, find_gap
 from doe.discrepancy.contest.held_out import held_out_gain
 from doe.discrepancy.contest.power import Effects, Power, powers, shown_apart
 from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
-from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
+from doe.discrepancy.contest.rounds import CandidateModel, CandidateModels, simulate_again
 from doe.discrepancy.contest.signatures import Signatures, signatures
 from doe.discrepancy.contest.slips import find_slips, without
 from doe.discrepancy.emulation.emulator import Emulator
@@ -58,14 +58,12 @@ from doe.numerics.one_thread import in_one_thread, steps_in_one_thread
 Analysis = Generator[list[Point], Outcomes, Discovery]
 
 DOUBTED = 0.25
-"""P value of a named mechanism, or of a tie, below which pairs are tried as well. In the thirteenth blind
-trials one mechanism was named in place of two at p of .05, .07, .14 and .21, and 9 of 111 right names had
-less than .25."""
+"""P value of a named mechanism, or of a tie, below which pairs are tried too (``trials/record/thirteenth``).
+"""
 
 TWIN = 0.8
-"""Mechanisms whose visible signatures correlate by more than this are tried in each other's place in a pair.
-Two pairs of the fifteenth blind trials got a wrong name while the true one, with a mechanism of the same
-signature by .92 and .96, was not tried: what residuals promise of a pair is coarse."""
+"""Correlation of visible signatures above which mechanisms replace each other in a pair
+(``trials/record/fifteenth``)."""
 
 LEAST_FREEDOM = 2
 """Degrees of freedom that a calibration must leave: with one, every mechanism has the same signature."""
@@ -73,7 +71,7 @@ LEAST_FREEDOM = 2
 
 @dataclass(frozen=True, eq=False)
 class _Base:
-    """The calibrated base with all that the library could change about it."""
+    """Calibrated base with the possible effects of the library."""
 
     fitted: Fitted
     gap: GapTest
@@ -83,25 +81,19 @@ class _Base:
 
 
 def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: int) -> Analysis:
-    """Analyse measured data; where there is a likely slip, without its values, too.
+    """Analyse measured data; where a slip is likely, analyse them without its values as well.
 
     Parameters
     ----------
-    measured : Measured
     emulator : Emulator
-        Of the bank; what it was told to leave out (``without``) is not in the library.
-    settings : Settings
+        Emulator of the bank; mechanisms that it withholds (``without``) are not in the library.
     seed : int
-        Of the bootstraps and of the fresh runs.
+        Seed of the bootstraps and of the fresh runs.
 
     Yields
     ------
     list of Point
-        A wave; its `Outcomes` must be sent back, columns as in the bank.
-
-    Returns
-    -------
-    Discovery
+        A batch; its `Outcomes` must be sent back, columns as in the bank.
     """
     slips = in_one_thread(find_slips)(measured, emulator, settings)
     found = yield from _analyse(measured, emulator, settings, seed)
@@ -120,8 +112,7 @@ def _analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: i
             Verdict.NOT_IDENTIFIABLE, (), "no training condition has a value to compare", None
         )
         return _empty(emulator, evidence, settings, seed, conclusion)
-    laboratory = Laboratory(emulator, emulator.space.conditions, seed)
-    parts = _Parts(emulator, evidence, settings, seed, laboratory)
+    parts = _Parts(emulator, evidence, settings, seed, FreshRuns(emulator, emulator.space.conditions, seed))
     model = Model(emulator, (), settings.systematic, views=evidence.views)
     base = parts.base(fit(Stack(model, evidence.training)))
     factors = len(emulator.space.factors)
@@ -138,15 +129,15 @@ def _analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: i
 
 
 def _search(parts: _Parts, base: _Base) -> Analysis:
-    """Go on where there is a gap: who could explain it, simulated again, decided, shown before and after."""
+    """Explain a gap: choose candidates, simulate them again, decide, compare before and after."""
     settings = parts.settings
-    singles_and_base = {(): Contender(base.fitted), **parts.contenders([(n,) for n in base.seen.names])}
-    contenders = yield from parts.contest(base, singles_and_base)
-    base = parts.base(contenders[()].fitted)
+    singles_and_base = {(): CandidateModel(base.fitted), **parts.candidates([(n,) for n in base.seen.names])}
+    candidates = yield from parts.contest(base, singles_and_base)
+    base = parts.base(candidates[()].fitted)
     if not base.gap.found:
         reason = f"fresh runs at the optimum agree with the data within the noise (p = {base.gap.p:.2g})"
         return parts.discovery(base, Conclusion(Verdict.NONE, (), reason, None), [])
-    singles = parts.assess(base, {names: one for names, one in contenders.items() if names})
+    singles = parts.assess(base, {names: one for names, one in candidates.items() if names})
     conclusion, assessments = conclude(singles, settings), singles
     chosen = None if conclusion.chosen is None else singles[conclusion.chosen]
     if _asks_for_two(chosen, singles, settings):
@@ -156,7 +147,7 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
         return parts.discovery(base, conclusion, assessments)
     best = assessments[conclusion.chosen].fitted
     requests = [Request(one.mechanisms, one.x[None], settings.direct_runs) for one in (base.fitted, best)]
-    direct = yield from parts.laboratory.wave(requests)
+    direct = yield from parts.fresh.batch(requests)
     compared = []
     for held_out, blocks in ((False, parts.evidence.training), (True, parts.evidence.held_out)):
         compared.append(
@@ -167,7 +158,7 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
 
 
 def drive(analysis: Analysis, simulator: Callable[[Sequence[Point]], Outcomes]) -> Discovery:
-    """Run an analysis to its end, its waves answered by a simulator, or by any function of points."""
+    """Run an analysis to its end; a simulator, or any function of points, answers its batches."""
     try:
         points = next(analysis)
         while True:
@@ -178,7 +169,7 @@ def drive(analysis: Analysis, simulator: Callable[[Sequence[Point]], Outcomes]) 
 
 
 def _asks_for_two(chosen: Assessment | None, singles: Sequence[Assessment], settings: Settings) -> bool:
-    """True if the best single mechanism leaves a gap, or the chosen one fits no better than a pair might."""
+    """Return True if the best single mechanism leaves a gap, or the chosen one is doubted."""
     if chosen is not None:
         return chosen.gap.p < DOUBTED
     best = min(singles, key=lambda one: one.score, default=None)
@@ -188,26 +179,26 @@ def _asks_for_two(chosen: Assessment | None, singles: Sequence[Assessment], sett
 def _pairs(
     parts: _Parts, base: _Base, singles: Sequence[Assessment], chosen: Assessment | None
 ) -> Generator[list[Point], Outcomes, list[Assessment]]:
-    """Try the pairs that promise most, then the twins of the best, until the best has none that is new."""
+    """Try the pairs that promise most, then the twins of the best, until the best has no new twin."""
     promising = _promising_pairs(singles, chosen, parts.settings)
-    if not promising:  # a single mechanism makes none
+    if not promising:  # e.g. with a single mechanism
         return []
-    contenders = yield from parts.contest(base, parts.contenders(promising))
+    candidates = yield from parts.contest(base, parts.candidates(promising))
     tried = set(promising)
-    while contenders:
-        best = min(contenders, key=lambda pair: contenders[pair].fitted.score)
+    while candidates:
+        best = min(candidates, key=lambda pair: candidates[pair].fitted.score)
         new = [pair for pair in _twins(best, base.seen) if pair not in tried]
         if not new:
             break
-        met = yield from parts.contest(base, {best: contenders[best], **parts.contenders(new)})
-        contenders, tried = {**contenders, **met}, tried.union(new)
-    return parts.assess(base, contenders)
+        met = yield from parts.contest(base, {best: candidates[best], **parts.candidates(new)})
+        candidates, tried = {**candidates, **met}, tried.union(new)
+    return parts.assess(base, candidates)
 
 
 def _promising_pairs(
     singles: Sequence[Assessment], chosen: Assessment | None, settings: Settings
 ) -> list[tuple[str, ...]]:
-    """Pairs to try first, those that the residuals of their members promise most of."""
+    """Return the pairs to try first: those whose members' residuals promise most."""
     promised = _promised_pairs(singles)
     if chosen is not None:  # any other joins it at hardly a loss: such pairs would crowd the rest out
         (name,), enough = chosen.mechanisms, chosen.gap.q - settings.tie_margin
@@ -217,7 +208,7 @@ def _promising_pairs(
 
 
 def _twins(pair: tuple[str, ...], seen: Signatures) -> list[tuple[str, ...]]:
-    """Pairs in which one mechanism of a pair is replaced by one that looks much like it."""
+    """Return pairs in which one mechanism of a pair is replaced by one that looks much like it."""
     alike = dict(zip(seen.names, seen.correlations > TWIN, strict=True))
     out = []
     for own, other in (pair, pair[::-1]):
@@ -227,7 +218,7 @@ def _twins(pair: tuple[str, ...], seen: Signatures) -> list[tuple[str, ...]]:
 
 
 def _promised_pairs(singles: Sequence[Assessment]) -> dict[tuple[str, ...], float]:
-    """All pairs, with what Q would be if the one joined the other: the residuals of each alone say so."""
+    """Return all pairs with the Q that the residuals of each member promise for them."""
     promised: dict[tuple[str, ...], float] = {}
     for one in singles:
         for name, score in zip(one.gap.mechanisms, one.gap.scores, strict=True):
@@ -239,29 +230,31 @@ def _promised_pairs(singles: Sequence[Assessment]) -> dict[tuple[str, ...], floa
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """Everything that the steps of one analysis share."""
+    """Parts that the steps of one analysis share."""
 
     emulator: Emulator
     evidence: Evidence
     settings: Settings
     seed: int
-    laboratory: Laboratory
+    fresh: FreshRuns
 
-    def contenders(self, models: Sequence[tuple[str, ...]]) -> dict[tuple[str, ...], Contender]:
+    def candidates(self, models: Sequence[tuple[str, ...]]) -> dict[tuple[str, ...], CandidateModel]:
         """Fit models on the emulator."""
         blocks = self.evidence.training
         systematic = self.settings.systematic
         views = self.evidence.views
         of = {m: Model(self.emulator, m, systematic, views=views) for m in models}
-        return {m: Contender(fit(Stack(model, blocks))) for m, model in of.items()}
+        return {m: CandidateModel(fit(Stack(model, blocks))) for m, model in of.items()}
 
-    def contest(self, base: _Base, contenders: Contenders) -> Generator[list[Point], Outcomes, Contenders]:
-        """Simulate again those that may explain the gap of the base."""
+    def contest(
+        self, base: _Base, candidates: CandidateModels
+    ) -> Generator[list[Point], Outcomes, CandidateModels]:
+        """Simulate again the models that may explain the gap of the base."""
         error, rivalry = self.settings.shortlist_share * base.gap.excess, partial(self.is_rival, base)
-        return simulate_again(contenders, self.laboratory, self.settings, error, rivalry)
+        return simulate_again(candidates, self.fresh, self.settings, error, rivalry)
 
     def base(self, fitted: Fitted) -> _Base:
-        """Look at the calibrated base."""
+        """Collect the gap, signatures and power of the calibrated base."""
         seen = signatures(fitted)
         gap = self._gap(fitted, self.settings.false_alarm, OF_THE_BASE)
         effects = Effects.of(fitted, seen)
@@ -270,17 +263,17 @@ class _Parts:
         )
 
     def whole(self, fitted: Fitted) -> Fitted:
-        """Weigh a fit on all conditions: those that it was fitted to, and those that it forecasts."""
+        """Weigh a fit on all conditions, those of the fit and those of the forecast."""
         return weigh(Stack(fitted.model, (*self.evidence.training, *self.evidence.held_out)), fitted.x)
 
     def apart(self, base: _Base, fitted: Fitted) -> dict[str, float]:
-        """By other mechanism, how far in Q it was shown to be from a single one of this size."""
+        """Return by other mechanism its distance in Q from a single mechanism of this size."""
         if len(fitted.mechanisms) != 1:
             return {}
         return shown_apart(base.effects, fitted.mechanisms[0], float(fitted.coded_sizes[0]))
 
     def is_rival(self, base: _Base, one: Fitted, leader: Fitted) -> bool:
-        """Say if it stays open which of two models is right."""
+        """Return True if it is open which of two models is right."""
         whole, best, margin = self.whole(one), self.whole(leader), self.settings.tie_margin
         behind = lag(whole.score - best.score, certain(whole) - certain(best), margin)
         apart = self.apart(base, leader).get(one.mechanisms[0], math.inf)
@@ -291,10 +284,10 @@ class _Parts:
         whole = self.whole(fitted)
         return find_gap(whole, signatures(whole), level, self.settings.draws, self.seed, questions)
 
-    def assess(self, base: _Base, contenders: Contenders) -> list[Assessment]:
-        """Look at contenders by every rule, best first."""
+    def assess(self, base: _Base, candidates: CandidateModels) -> list[Assessment]:
+        """Apply every rule to the candidates, best first."""
         settings, out = self.settings, []
-        for names, one in contenders.items():
+        for names, one in candidates.items():
             gap = self._gap(one.fitted, settings.fit_level, OF_A_CANDIDATE)
             gain = held_out_gain(base.fitted, one.fitted, self.evidence.held_out, settings.draws, self.seed)
             share = explained_share(base.gap, gap)
@@ -310,13 +303,13 @@ class _Parts:
         assessments: Sequence[Assessment],
         before_after: Sequence[BeforeAfter] = (),
     ) -> Discovery:
-        """The record of all that was found."""
+        """Return the record of all findings."""
         closest = assessments[0] if assessments else None
         chosen = None if conclusion.chosen is None else assessments[conclusion.chosen]
         shown = closest if chosen is None else chosen
         fit = None if shown is None else fit_record(shown.fitted, shown.gap, self.evidence)
-        failures = self.laboratory.failures
-        notes = [f"{failures} of {self.laboratory.cases} fresh runs failed"] if failures else []
+        failures = self.fresh.failures
+        notes = [f"{failures} of {self.fresh.cases} fresh runs failed"] if failures else []
         drop = base.gap
         return Discovery(
             verdict=conclusion.verdict,
@@ -337,15 +330,15 @@ class _Parts:
             before_after=tuple(before_after),
             next_experiment=self._next(base, conclusion, assessments),
             notes=(*self.evidence.notes, *scatter_notes(base.fitted), *self.emulator.notes, *notes),
-            effort=Effort(self.seed, self.settings.sha256, self.emulator.cases, self.laboratory.cases),
+            effort=Effort(self.seed, self.settings.sha256, self.emulator.cases, self.fresh.cases),
         )
 
     def _next(
         self, base: _Base, conclusion: Conclusion, assessments: Sequence[Assessment]
     ) -> NextExperiment | None:
-        """For the two best explanations, where there are two; else for the best against the base.
+        """Propose an experiment for the two best explanations, or for the best one and the base.
 
-        Those of a tie are both of the tie. Two models that are both refused are not worth a measurement.
+        In a tie both are of the tie. Two rejected models are not worth a measurement.
         """
         if conclusion.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
             return None
@@ -366,22 +359,13 @@ class _Parts:
 def _empty(
     emulator: Emulator, evidence: Evidence, settings: Settings, seed: int, conclusion: Conclusion
 ) -> Discovery:
-    """The record of data that nothing can be fitted to."""
+    """Return the record of data to which nothing can be fitted."""
     return Discovery(
         verdict=conclusion.verdict,
         reason=conclusion.reason,
         named=(),
         factors=emulator.space.factors,
         data=data_record(emulator, evidence),
-        base=None,
-        chosen=None,
-        gap=None,
-        drifts=(),
-        candidates=(),
-        power=(),
-        confounding=None,
-        before_after=(),
-        next_experiment=None,
         notes=(*evidence.notes, *emulator.notes),
         effort=Effort(seed, settings.sha256, emulator.cases, 0),
     )

@@ -1,10 +1,8 @@
-"""Kriging: what a polynomial misses, as a smooth random function of the coded parameters.
+"""Kriging: a smooth random function of the coded parameters, known at noisy points.
 
-The covariance is amplitude x exp(-|x - x'|^2 / 2) of parameters divided by their lengths (Rasmussen and
-Williams 2006, chapter 2).
+The covariance is amplitude x exp(-|x - x'|^2 / 2), with the parameters divided by their lengths (Rasmussen
+and Williams 2006, chapter 2).
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -32,7 +30,7 @@ class Covariance:
     amplitude: float
     """Variance of the function."""
     length: np.ndarray
-    """Of each parameter, in coded units, (parameters,)."""
+    """Length of each parameter, in coded units, (parameters,)."""
 
     def __call__(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Covariance between points (m, parameters) and (n, parameters), (m, n)."""
@@ -49,14 +47,14 @@ class Kriging:
     weights: np.ndarray
     """Inverse covariance of the data times the data, (n,)."""
     inverse: np.ndarray
-    """That inverse, (n, n)."""
+    """Inverse covariance of the data, (n, n)."""
 
     def mean(self, x: np.ndarray) -> np.ndarray:
-        """Expected value at points (m, parameters), (m,)."""
+        """Return the expected value at points (m, parameters), (m,)."""
         return np.asarray(self.covariance(x, self.points) @ self.weights)
 
     def variance(self, x: np.ndarray) -> np.ndarray:
-        """Variance at points (m, parameters), (m,)."""
+        """Return the variance at points (m, parameters), (m,)."""
         known = self.covariance(x, self.points)
         explained = np.einsum("mi,ij,mj->m", known, self.inverse, known)
         return np.asarray(np.maximum(self.covariance.amplitude - explained, 0.0))
@@ -68,28 +66,20 @@ class Kriging:
 
 
 def squared_exponential(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """exp(-|a_i - b_j|^2 / 2) of scaled points (m, p) and (n, p), (m, n)."""
+    """Return exp(-|a_i - b_j|^2 / 2) of scaled points (m, p) and (n, p), (m, n)."""
     squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * a @ b.T
     return np.asarray(np.exp(-0.5 * np.maximum(squares, 0.0)))
 
 
 def krige(points: np.ndarray, values: np.ndarray, noise: np.ndarray, covariance: Covariance) -> Kriging:
-    """Condition a function of known covariance on data.
-
-    Parameters
-    ----------
-    points : (n, parameters) array
-    values, noise : (n,) array
-        Data and the variances of their noise.
-    covariance : Covariance
-    """
+    """Condition a function of known covariance on data (n,) with known variances of their noise (n,)."""
     of_data = covariance(points, points) + np.diag(noise)
     inverse = cho_solve(cho_factor(of_data), np.eye(len(points)))
     return Kriging(points, covariance, inverse @ values, inverse)
 
 
 def fit_kriging(points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Kriging:
-    """Find amplitude and lengths of largest marginal likelihood for known variances of the noise, all (n,)."""
+    """Find amplitude and lengths of largest marginal likelihood, for known noise variances (n,)."""
     scale = float(np.sqrt(np.mean(values**2)))
     start = np.log([START_AMPLITUDE, *[START_LENGTH] * points.shape[1]])
     bounds = np.log([AMPLITUDE_RANGE, *[LENGTH_RANGE] * points.shape[1]])
@@ -99,7 +89,7 @@ def fit_kriging(points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Kr
 
 
 def fit_noisy_kriging(points: np.ndarray, values: np.ndarray) -> tuple[Kriging, float]:
-    """Find amplitude, lengths and one variance of the noise of largest likelihood; return that variance too."""
+    """Find amplitude, lengths and one noise variance of largest likelihood; return that variance as well."""
     scale, size = float(np.sqrt(np.mean(values**2))) or 1.0, points.shape[1]
     amplitudes, lengths, noises = NOISY_RANGES
     bounds = np.log([amplitudes, *[lengths] * size, noises])
@@ -117,13 +107,9 @@ def _loss(
 ) -> tuple[float, np.ndarray]:
     """Compute minus the log marginal likelihood but for a constant, and its slopes (ibid., equation 5.9).
 
-    A bank has hundreds of such fits, of hundreds of runs each. The slope by a length is a sum over all pairs
-    of runs, of their squared distance times a weight: row sums of the weights spare a matrix of distances.
-
-    Parameters
-    ----------
-    logarithms
-        Those of the amplitude, of each length and, where the noise is unknown (None), of its variance.
+    The slope by a length is a sum over all pairs of runs, of their squared distance times a weight: row sums
+    of the weights replace a matrix of distances. Logarithms are those of the amplitude, of each length and,
+    where ``noise`` is None, of its variance.
     """
     size = points.shape[1]
     amplitude, scaled = np.exp(logarithms[0]), points / np.exp(logarithms[1 : 1 + size])

@@ -1,6 +1,4 @@
-"""One thread for the linear algebra of the statistics: their matrices are small, threads would only wait."""
-
-from __future__ import annotations
+"""One thread for the linear algebra of the statistics: threads cost more than they save on small matrices."""
 
 from collections.abc import Callable, Generator
 from functools import wraps
@@ -28,7 +26,7 @@ def in_one_thread(function: Callable[P, R]) -> Callable[P, R]:
 def steps_in_one_thread(
     function: Callable[P, Generator[Y, S, R]],
 ) -> Callable[P, Generator[Y, S, R]]:
-    """Run each step of a generator so; whoever answers it has all threads."""
+    """Limit each step of a generator to one BLAS thread; the caller keeps all."""
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> Generator[Y, S, R]:

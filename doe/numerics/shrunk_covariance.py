@@ -1,7 +1,5 @@
 """Covariance of few rows, shrunk towards equal and independent columns."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,4 +1,4 @@
-"""Figures of measured against expected: along a path, and against a reference."""
+"""Figures of measured against expected values: along a path, and against a reference."""
 
 from collections.abc import Sequence
 from itertools import cycle
@@ -24,7 +24,7 @@ def climb_plot(
     response_label: str = "response",
     axes: Axes | None = None,
 ) -> Figure:
-    """Draw the mean response along a path against the model's prediction and the target, its sd as a band."""
+    """Draw the mean response along a path, the model's prediction and the target with its sd as a band."""
     table = climb_table(path, response, target)
     figure, axes = canvas(axes, 3.8)
     axes.axhline(target, color=VERMILION, linewidth=1.2, label=f"target {target:g}")
@@ -49,20 +49,11 @@ def agreement_plot(
     reference_label: str = "reference",
     axes: Axes | None = None,
 ) -> Figure:
-    """Draw values against their reference, one colour a group, with the noise (+- 1 sd) of both.
-
-    Parameters
-    ----------
-    result : Agreement
-    groups : sequence of str, one a run
-    value_label, reference_label : str
-    axes : Axes, optional
-        Where to draw; default a figure of its own.
-    """
+    """Draw values against their reference, one colour per group, with the noise (+- 1 sd) of both."""
     checked_kind("result", result, Agreement)
     groups = checked_list("groups", groups)
     if len(groups) != result.runs:
-        raise DesignError(f"groups: a name for each of {result.runs} runs, got {len(groups)}")
+        raise DesignError(f"groups must be a name for each of {result.runs} runs, got {len(groups)}")
     figure, axes = canvas(axes, 4.6)
     ends = [
         min(result.response.min(), result.reference.min()),

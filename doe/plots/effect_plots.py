@@ -1,4 +1,4 @@
-"""Figures of what each factor does: main effects, interactions, the cube, the prediction profiler."""
+"""Figures of the effect of each factor: main effects, interactions, the cube, the prediction profiler."""
 
 from collections.abc import Mapping, Sequence
 
@@ -41,10 +41,7 @@ def main_effects_plot(
     response_label: str = "response",
     axes: Axes | None = None,
 ) -> Figure:
-    """Draw the mean response at each level of every factor, side by side over one scale.
-
-    The dashed line is the mean of all. Parallel to it: the factor does nothing.
-    """
+    """Draw the mean response at each level of every factor, on one scale; the dashed line is the mean."""
     figure, axes = canvas(axes, 3.6)
     _, values = observations(design, response)
     axes.axhline(values.mean(), color=MUTED, linestyle="--", linewidth=1.0)
@@ -76,12 +73,9 @@ def interaction_plot(
     response_label: str = "response",
     axes: Axes | None = None,
 ) -> Figure:
-    """Draw the mean response against one factor, a line for each level of another.
-
-    Parallel lines: the two do not interact.
-    """
+    """Draw the mean response against one factor, a line for each level of another."""
     if checked_kind("x", x, str) == checked_kind("trace", trace, str):
-        raise DesignError(f"an interaction is that of two different factors, got {x!r} twice")
+        raise DesignError(f"factors of an interaction must differ, got {x!r} twice")
     figure, axes = canvas(axes, 3.6)
     table = level_means(design, response, x, trace).reset_index().pivot_table("mean", x, trace)
     numeric = not isinstance(design.factor(x), Category)
@@ -108,27 +102,18 @@ def cube_plot(
     response_label: str = "response",
     axes: Axes | None = None,
 ) -> Figure:
-    """Draw the fitted response at the eight corners of three factors.
-
-    Parameters
-    ----------
-    surface : Surface
-        Of three factors or more.
-    factors : three names, optional
-        Default the first three.
-    at : mapping of natural values by factor, optional
-        Where the other factors are held; default their centers.
-    """
+    """Draw the fitted response at the corners of three factors (default: the first), the others at ``at``."""
     checked_kind("surface", surface, Surface)
     names = surface.design.names[:3] if factors is None else checked_list("factors", factors)
     chosen = [surface.design.factor(name) for name in names]
     if len(set(names)) != 3 or len(names) != 3:
-        raise DesignError(f"a cube has three different factors, got {names}")
+        raise DesignError(f"factors of a cube must be three different ones, got {names}")
     centers = {
         factor.name: factor.to_natural(factor.codes[0] if isinstance(factor, Category) else 0.0)
         for factor in surface.design.factors
     }
-    held = checked_setting("at", centers | ({} if at is None else checked_map("at", at)), surface.design)
+    chosen_at = {} if at is None else checked_map("at", at)
+    held = checked_setting("at", centers | chosen_at, surface.design.factors)
     figure, axes = canvas(axes, 4.2)
     corners = np.array([[a, b, c] for c in (0, 1) for b in (0, 1) for a in (0, 1)], dtype=float)
     points = pd.DataFrame([held] * 8)
@@ -176,18 +161,16 @@ def profile_plot(
     Parameters
     ----------
     surfaces : mapping of Surface by response
-        Over the same factors.
+        Surfaces over the same factors.
     at : mapping of natural values by factor
-        The setting, for instance that of ``most_desirable``.
-    wishes : mapping of Wish by response, optional
-    alpha : float
+        The setting, e.g. that of ``most_desirable``.
     axes : array of Axes, shape (responses, factors), optional
         One row more with wishes.
     """
     design = checked_surfaces(surfaces)
-    at = checked_setting("the setting of the profiler", at, design)
+    at = checked_setting("the setting of the profiler", at, design.factors)
     if wishes is not None and set(checked_map("wishes", wishes)) != set(surfaces):
-        raise DesignError(f"a wish for every surface: {sorted(surfaces)} and {sorted(wishes)}")
+        raise DesignError(f"wishes must be for every surface, got {sorted(surfaces)} and {sorted(wishes)}")
     for name, wish in ({} if wishes is None else wishes).items():
         checked_kind(f"wish of {name!r}", wish, Wish)
     rows = len(surfaces) + (wishes is not None)

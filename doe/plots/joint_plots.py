@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations, cycle
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,13 +19,13 @@ from doe.response.joint_fit import JointFit
 from doe.response.region import Region
 
 COLORS = (BLUE, ORANGE, PURPLE, MUTED)
-"""Of the responses, in order."""
+"""Colours of the responses, in order."""
 
 SIZES = {"D": 6.0, "*": 13.0}
-"""Of the markers [points]."""
+"""Sizes of the markers [points]."""
 
 PANEL = 3.4
-"""Inches: side of one plane."""
+"""Side of one plane [inches]."""
 
 
 def joint_plot(
@@ -36,17 +37,12 @@ def joint_plot(
 
     Parameters
     ----------
-    fit : JointFit
-        Over two factors at least.
     truth : mapping of natural values by factor, optional
-        Where the responses came from, when that is known.
+        Known true setting behind the responses.
     axes : sequence of Axes, optional
-        Where to draw, one for each pair of factors; default a figure of its own.
+        Axes to draw on, one for each pair of factors. Default: a figure of its own.
 
-    Raises
-    ------
-    DesignError
-        When there is only one factor, or a true setting that lacks one.
+    Raises DesignError: only one factor, or a true setting that lacks one.
     """
     checked_kind("fit", fit, JointFit)
     names = [factor.name for factor in fit.factors]
@@ -54,14 +50,16 @@ def joint_plot(
     if not pairs:
         raise DesignError(f"responses are drawn over two factors, the design has only {names[0]!r}")
     if truth is not None:
-        truth = checked_setting("the true setting", truth, next(iter(fit.goals.values())).surface.design)
+        truth = checked_setting("the true setting", truth, fit.factors)
     if axes is None:
         figure = Figure(figsize=(PANEL * len(pairs), PANEL + 0.7), layout="constrained")
         panels = list(figure.subplots(1, len(pairs), squeeze=False)[0])
     else:
         panels = checked_list("axes", axes)
         if len(panels) != len(pairs):
-            raise DesignError(f"axes: one for each of {len(pairs)} pairs of factors, got {len(panels)}")
+            raise DesignError(
+                f"axes must be one for each of {len(pairs)} pairs of factors, got {len(panels)}"
+            )
         figure, _ = canvas(panels[0], 0.0)
     bands = {name: fit.band(name) for name in fit.goals}
     for panel, (x, y) in zip(panels, pairs, strict=True):
@@ -89,7 +87,7 @@ def joint_plot(
 def _fill(
     axes: Axes, region: Region, plane: tuple[str, str], at: Mapping[str, float], color: str, alpha: float
 ) -> None:
-    """Fill a region's cut by a plane; the axes reach as far as the region was searched."""
+    """Fill a region's cut by a plane; the axes cover the searched region."""
     x, y = plane
     cells = region.section(x, y, at).T.astype(float)
     axes.contourf(region.axis(x), region.axis(y), cells, levels=[0.5, 1.5], colors=[color], alpha=alpha)
@@ -97,14 +95,10 @@ def _fill(
 
 
 def _marker(symbol: str, color: str, label: str) -> Line2D:
-    size = SIZES[symbol]
-    return Line2D(
-        [],
-        [],
-        marker=symbol,
-        markersize=size,
-        color=color,
-        markeredgecolor="white",
-        linestyle="",
-        label=label,
-    )
+    look: dict[str, Any] = {
+        "marker": symbol,
+        "markersize": SIZES[symbol],
+        "color": color,
+        "markeredgecolor": "white",
+    }
+    return Line2D([], [], linestyle="", label=label, **look)

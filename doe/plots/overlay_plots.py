@@ -1,4 +1,4 @@
-"""Contours of several responses laid over one another, and the settings that all of them allow."""
+"""Contours of several responses in one figure, and the settings that all of them allow."""
 
 from collections.abc import Mapping
 
@@ -35,13 +35,13 @@ def overlay_plot(
     Parameters
     ----------
     surfaces : mapping of Surface by response
-        Over the same factors, up to five.
+        Up to five, over the same factors.
     limits : mapping of (low, high) by response
-        None where a side is free.
+        None on an open side.
     x, y, at, extent
         As in ``doe.plots.plot_data.surface_grid``.
     point : mapping of natural values by factor, optional
-        A setting to mark; factors off the axes are held there unless ``at`` says otherwise.
+        A setting to mark; factors off the axes are held there unless ``at`` is given.
     """
     design = checked_surfaces(surfaces)
     if set(checked_map("limits", limits)) != set(surfaces) or len(surfaces) > len(COLORS):
@@ -50,12 +50,12 @@ def overlay_plot(
         )
     for name, pair in limits.items():
         if not isinstance(pair, tuple | list) or len(pair) != 2:
-            raise DesignError(f"the limits of {name!r} are (low, high), None where free, got {pair!r}")
+            raise DesignError(f"the limits of {name!r} must be (low, high), None where free, got {pair!r}")
         for limit in pair:
             if limit is not None:
                 checked_number(f"a limit of {name!r}", limit)
     if point is not None:
-        point = checked_setting("point", point, design)
+        point = checked_setting("point", point, design.factors)
     given = axes is not None
     figure, axes = canvas(axes, 4.8)
     held = at if at is not None or point is None else point

@@ -1,4 +1,4 @@
-"""Colours of every figure, chart and page: Okabe and Ito's, which colour-blind readers tell apart."""
+"""Colours of every figure, chart and page: Okabe and Ito's, which colour-blind readers can distinguish."""
 
 BLUE, VERMILION, ORANGE, SKY = "#0072B2", "#D55E00", "#E69F00", "#56B4E9"
 GREEN, PURPLE = "#00795a", "#b0578d"

@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from doe.arguments import checked_count, checked_kind, checked_map, checked_number
-from doe.design.design import checked_setting
+from doe.design.design import checked_setting, coded_points
 from doe.design.factors import Factor
-from doe.design.points import coded_points
 from doe.errors import DesignError
 from doe.response.response_surface import Surface
 from doe.screen.screened_effects import ScreenResult
 
 MOST_POINTS = 2_000
-"""Points along an axis of a figure."""
+"""Largest number of points along an axis of a figure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,7 @@ class SurfaceGrid:
     mean: NDArray[np.float64]
     """Fitted means, shape (resolution of y, resolution of x)."""
     se: NDArray[np.float64]
-    """Their standard errors, same shape."""
+    """Standard errors of the means, same shape."""
 
 
 def pareto_points(result: ScreenResult) -> pd.DataFrame:
@@ -45,8 +44,8 @@ def pareto_points(result: ScreenResult) -> pd.DataFrame:
 def half_normal_points(effects: pd.Series) -> pd.DataFrame:
     """Return abs_effect and half-normal quantile of every effect, ascending (Daniel 1959).
 
-    Inert effects lie on a line through the origin; active ones stand off to the large side. The i-th of m
-    sits at the half-normal quantile of (i - 1/2) / m.
+    Inert effects are on a line through the origin, active ones on the large side of it. The quantile of the
+    i-th of m is that of (i - 1/2) / m.
     """
     ordered = effects.abs().sort_values()
     share = (np.arange(1, len(ordered) + 1) - 0.5) / len(ordered)
@@ -54,7 +53,7 @@ def half_normal_points(effects: pd.Series) -> pd.DataFrame:
 
 
 def normal_points(values: pd.Series) -> pd.DataFrame:
-    """Return value and normal quantile of every value, ascending; the i-th of n sits at (i - 1/2) / n."""
+    """Return value and normal quantile of every value, ascending; the i-th of n has that of (i - 1/2) / n."""
     ordered = values.sort_values()
     share = (np.arange(1, len(ordered) + 1) - 0.5) / len(ordered)
     return pd.DataFrame({"value": ordered, "quantile": stats.norm.ppf(share)})
@@ -72,12 +71,10 @@ def surface_grid(
 
     Parameters
     ----------
-    surface : Surface
-        Of at least two factors.
     x, y : str, optional
-        Names of the factors on the axes; default the first two.
+        Names of the factors on the axes. Default: the first two.
     at : mapping of natural values by factor, optional
-        Where the other factors are held; default their centers.
+        Settings of the other factors. Default: their centers.
     extent : float
         Coded half width of the rectangle.
     resolution : int
@@ -93,9 +90,9 @@ def surface_grid(
         for name, fallback in zip((x, y), design.names, strict=False)
     )
     if x_factor == y_factor:
-        raise DesignError(f"a surface is drawn over two different factors, got {x_factor.name!r} twice")
+        raise DesignError(f"x and y must be different factors, got {x_factor.name!r} twice")
     centers = {factor.name: factor.center for factor in design.factors}
-    held = checked_setting("at", centers | ({} if at is None else checked_map("at", at)), design)
+    held = checked_setting("at", centers | ({} if at is None else checked_map("at", at)), design.factors)
     line = np.linspace(-extent, extent, resolution)
     x_values, y_values = x_factor.to_natural(line), y_factor.to_natural(line)
     points = pd.DataFrame(held, index=range(resolution**2))

@@ -57,13 +57,14 @@ def contour_plot(
 ) -> Figure:
     """Draw the fitted surface as contours over two factors.
 
-    With the target's curve, a chosen point (natural values by factor), a compatible region (in more than two
-    factors: its shadow on the plane of the axes) and the design's runs. ``x``, ``y``, ``at``, ``extent`` as
-    in ``doe.plots.plot_data.surface_grid``; factors off the axes are held at the point when there is one.
+    Further parts: the target's curve, a chosen point (natural values by factor), a compatible region (in more
+    than two factors: its shadow on the plane of the axes) and the design's runs. ``x``, ``y``, ``at``,
+    ``extent`` are those of ``doe.plots.plot_data.surface_grid``; factors off the axes are held at the point
+    if there is one.
     """
     checked_kind("surface", surface, Surface)
     if point is not None:
-        point = checked_setting("point", point, surface.design)
+        point = checked_setting("point", point, surface.design.factors)
     if region is not None:
         checked_kind("region", region, Region)
     if target is not None:
@@ -106,7 +107,7 @@ def surface_plot(
     response_label: str = "response",
     axes: Axes | None = None,
 ) -> Figure:
-    """Draw the fitted surface over two factors in perspective (3d axes), with the target's curve on it."""
+    """Draw the fitted surface over two factors in perspective (3d axes), with the target's curve."""
     if target is not None:
         checked_number("target", target)
     grid = surface_grid(surface, x, y, at, extent, resolution=41)
@@ -114,7 +115,7 @@ def surface_plot(
         figure = Figure(figsize=(WIDTH, 5.0), layout="constrained")
         axes = figure.add_subplot(projection="3d", computed_zorder=False)
     figure, _ = canvas(axes, 5.0)
-    solid: Any = axes  # matplotlib does not say that the projection gives further methods
+    solid: Any = axes  # the projection has further methods, unknown to the types of matplotlib
     solid.plot_surface(*np.meshgrid(grid.x, grid.y), grid.mean, cmap="cividis", alpha=0.85, linewidth=0.2)
     if target is not None and grid.mean.min() < target < grid.mean.max():
         curve = {"levels": [target], "colors": [VERMILION], "linewidths": 3.0}

@@ -6,18 +6,17 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from doe.arguments import checked_count, checked_number
-from doe.design.points import natural_points
-from doe.response.fitted import FittedSurface
-from doe.response.quadratic import QuadraticForm
+from doe.design.design import natural_points
+from doe.response.quadratic import FittedSurface, QuadraticForm
 
 CURVE_RESOLUTION = 201
-"""Grid lines along each factor that a curve of two factors is traced through."""
+"""Grid lines along each factor for a curve of two factors."""
 
 MOST_LINES = 10_000
-"""Grid lines along a factor that may be asked for."""
+"""Largest number of grid lines along a factor."""
 
 LINE_BUDGET = 4_000
-"""Lines parallel to the axes that a contour in three or more factors is sampled on."""
+"""Lines parallel to the axes that sample a contour in three or more factors."""
 
 
 def contour(
@@ -25,28 +24,12 @@ def contour(
 ) -> pd.DataFrame:
     """Return points where the fitted mean is the target, inside the coded box -extent..+extent.
 
-    One factor: the roots. Two: ordered points along the curve, the index numbering its separate pieces.
-    More: a cloud of the contour's crossings with lines parallel to the axes. Every point solves the fitted
-    equation.
+    One factor: the roots. Two: ordered points along the curve, the index numbering its separate pieces. More:
+    crossings of the contour with lines parallel to the axes, ``resolution`` along each factor. Every point
+    solves the fitted equation. The table has a column for each factor in natural units; it is empty when the
+    target is not reached.
 
-    Parameters
-    ----------
-    surface : FittedSurface
-    target : float
-    extent : float
-        Coded half width of the box.
-    resolution : int, optional
-        Grid lines along each factor.
-
-    Returns
-    -------
-    DataFrame
-        A column for each factor in natural units; empty when the target is not reached.
-
-    Raises
-    ------
-    DesignError
-        A target, an extent or a resolution that is no finite number in its range.
+    Raises DesignError: a target, an extent or a resolution out of its range.
     """
     checked_number("target", target)
     checked_number("extent, the coded half width of the box,", extent, above=0.0)
@@ -85,7 +68,7 @@ def _traced_curves(
 def _onto_root(
     form: QuadraticForm, target: float, vertex: NDArray[np.float64], grid: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return a vertex moved along the grid edge that it lies on, to the nearest root within one cell."""
+    """Return a vertex moved along its grid edge to the nearest root within one cell."""
     off_grid = np.abs(vertex[:, None] - grid[None, :]).min(axis=1)
     axis = int(off_grid.argmax())
     roots = form.roots_along(axis, vertex[None, :], target)[0]
@@ -99,7 +82,7 @@ def _onto_root(
 def _line_crossings(
     form: QuadraticForm, target: float, extent: float, resolution: int | None
 ) -> NDArray[np.float64]:
-    """Return where lines parallel to each axis cross the contour inside the box, shape (points, factors)."""
+    """Return crossings of lines parallel to each axis with the contour, shape (points, factors)."""
     count = len(form.slopes)
     along = resolution or max(5, int((LINE_BUDGET / count) ** (1.0 / max(count - 1, 1))))
     grid = np.linspace(-extent, extent, along)

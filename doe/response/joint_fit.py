@@ -1,4 +1,4 @@
-"""Several responses together: the setting that they agree on best, where they agree, what stays open."""
+"""Several responses together: their best common setting, their agreement, and what stays open."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -10,10 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize
 
-from doe.arguments import checked_count, checked_level, checked_map, checked_number
+from doe.arguments import checked_count, checked_level
+from doe.design.design import coded_setting
 from doe.design.factors import Factor
 from doe.errors import DesignError
-from doe.response.fitted import FittedSurface, unselected
+from doe.response.quadratic import FittedSurface, unselected
 from doe.response.region import Region, box_cells, misfit
 from doe.response.response_surface import Surface
 from doe.samples.sample import Sample
@@ -26,27 +27,26 @@ NODES = 5
 """Cells at which the level of several responses is found."""
 
 PULL = 1e-3
-"""Weight of the squared distance to the centre beside chi2: it chooses among settings that are as good."""
+"""Weight of the squared distance to the centre added to chi2: it decides among equally good settings."""
 
 STARTS = 3
-"""Cells from which the smallest chi2 is refined: the best ones of as many orthants."""
+"""Cells from which the smallest chi2 is refined: the best ones of different orthants."""
 
 
 @dataclass(frozen=True)
 class Goal:
-    """One response: its fitted surface, and what was measured."""
+    """One response: its fitted surface, and its measured target."""
 
     surface: FittedSurface
     target: Sample
 
     def __post_init__(self) -> None:
-        for place, wanted in (("design", "a fitted surface"), ("evaluate", "a fitted surface")):
-            if not hasattr(self.surface, place):
-                raise DesignError(f"a goal's surface is {wanted}, got {self.surface!r}")
+        if not (hasattr(self.surface, "design") and hasattr(self.surface, "evaluate")):
+            raise DesignError(f"a goal's surface must be a fitted surface, got {self.surface!r}")
         if not isinstance(self.target, Sample):
-            raise DesignError(f"a goal's target is a Sample (mean, sd, n), got {self.target!r}")
+            raise DesignError(f"a goal's target must be a Sample (mean, sd, n), got {self.target!r}")
         if not self.target.sd > 0.0:
-            raise DesignError(f"a response is weighed by its target's spread, got {self.target}")
+            raise DesignError(f"a goal's target must have a spread, got {self.target}")
 
     @property
     def fit(self) -> FittedSurface:
@@ -60,17 +60,16 @@ class Goal:
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """Responses fitted over the same factors, against their targets; made by ``joint_fit``.
+    """Responses fitted over the same factors, with their targets; made by ``joint_fit``.
 
-    The region explored is the coded box -extent..+extent as far as the farthest run. There a setting is
-    compatible with several responses when none of them differs from its target significantly, at the level of
-    each at which all together hold alpha (``level``; ``doe.response.region.compatible_region`` has the rule for one).
-    That level lies above alpha over their number where the errors of the fits hang together, as those of
-    responses of the same runs do, whose residuals tell it. The targets are measured one independently of the
-    other. So the true setting is compatible with probability 1 - alpha, where the models hold: .94 to .96 for
-    .95 with 3 measurements of each target or more (.943 to .964 with 6 responses and 3 measurements); with 2
-    at least .94, up to .995. Surfaces whose terms the
-    data chose count as they were before the choice.
+    The region explored is the coded box -extent..+extent up to the distance of the farthest run. There a
+    setting is compatible with several responses when none differs from its target significantly, at the level
+    of each at which all together hold alpha (``level``; ``doe.response.region.compatible_region`` has the
+    rule for one). That level is above alpha over their number where the errors of the fits are correlated, as
+    in responses of the same runs. The targets are independent measurements. So the true setting is compatible
+    with probability 1 - alpha, where the models hold: .94 to .96 for .95 with 3 measurements of each target
+    or more; with 2 at least .94, up to .995. Surfaces whose terms the data chose count as they were before
+    the choice.
     """
 
     goals: Mapping[str, Goal]
@@ -95,35 +94,35 @@ class JointFit:
 
     @cached_property
     def misfits(self) -> dict[str, Misfit]:
-        """By response, how far fit and target differ at every cell."""
+        """Differences of fit and target at every cell, by response."""
         return {name: goal.misfit(self.cells) for name, goal in self.goals.items()}
 
     def region(self, *names: str) -> Region:
-        """Return where some responses agree with their targets; without names, all of them."""
+        """Return the agreement of some responses with their targets; without names, of all of them."""
         return self._region(self._mask(names or tuple(self.goals)))
 
     def band(self, name: str) -> Region:
-        """Return where one response agrees at the level that all share; all bands meet in ``region()``."""
+        """Return the agreement of one response at the common level; all bands meet in ``region()``."""
         self._check_names((name,))
         place = list(self.goals).index(name)
         return self._region(self.explored & self._accepted(tuple(self.goals), self.misfits)[:, place])
 
     def share(self, *names: str) -> float:
-        """Return which part of the region explored is compatible with some responses (default: all)."""
+        """Return the share of the explored region that is compatible with some responses (default: all)."""
         mask = self._mask(names or tuple(self.goals))
         return float(np.count_nonzero(mask) / np.count_nonzero(self.explored))
 
     def level(self, point: Mapping[str, float] | None = None) -> float:
         """Return the level of each response's test at which all of them together hold alpha, at a point.
 
-        Found by drawing (``doe.samples.simultaneous``), with the errors as they are estimated there.
+        It is found by drawing (``doe.samples.simultaneous``), with the errors as they are estimated there.
         """
         first = self._first(tuple(self.goals), self._misfits_at(self._coded(point)))
         return float(self._together(tuple(self.goals)).levels(first)[0])
 
     @cached_property
     def coded_point(self) -> NDArray[np.float64]:
-        """The setting with the smallest chi2; among several as good, the one nearest to the centre."""
+        """Setting with the smallest chi2; among several equally good, the one nearest to the centre."""
         objective = sum(self._chi2(found) for found in self.misfits.values())
         objective = objective + PULL * np.sum(self.cells**2, axis=1)
         order = np.argsort(np.where(self.explored, objective, np.inf), kind="stable")
@@ -138,12 +137,7 @@ class JointFit:
         return {f.name: float(f.to_natural(x)) for f, x in zip(self.factors, self.coded_point, strict=True)}
 
     def tests(self, point: Mapping[str, float] | None = None) -> pd.DataFrame:
-        """Compare every response with its target at a point.
-
-        Parameters
-        ----------
-        point : mapping of natural values by factor, optional
-            Default: the setting with the smallest chi2.
+        """Compare every response with its target at a point (default: that of the smallest chi2).
 
         Returns
         -------
@@ -173,14 +167,14 @@ class JointFit:
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
 
     def agrees(self, point: Mapping[str, float] | None = None) -> bool:
-        """Tell if all responses agree with their targets at a point (default: that of the smallest chi2)."""
+        """Return True if all responses agree with their targets at a point (default: the smallest chi2)."""
         return bool(self._accepted(tuple(self.goals), self._misfits_at(self._coded(point))).all())
 
     @cached_property
     def shrinkage(self) -> pd.DataFrame:
-        """Shares of the compatible region left by each response: the first, then what shrinks it most.
+        """Share of the compatible region after each response: the first, then the one that shrinks it most.
 
-        A response that tells nothing new makes it a little larger, as each is then held to a stricter level.
+        A response without new information makes it a little larger, as each then has a stricter level.
 
         Returns
         -------
@@ -202,11 +196,11 @@ class JointFit:
 
     @cached_property
     def directions(self) -> pd.DataFrame:
-        """Directions of the factors by how well the responses together pin them down, the best first.
+        """Directions of the factors by how well the responses together determine them, the best first.
 
-        They are the eigenvectors of the Fisher information at the point of the smallest chi2,
-        sum of g g' / s^2 over the responses with the gradient g of the fitted mean and the error s of its
-        difference from the target, all in coded units.
+        They are the eigenvectors of the Fisher information at the point of the smallest chi2, sum of g g' /
+        s^2 over the responses with the gradient g of the fitted mean and the error s of its difference from
+        the target, in coded units.
 
         Returns
         -------
@@ -215,8 +209,8 @@ class JointFit:
             infinite where no response changes), span (of the compatible region along it, over that of the
             region explored; 0 where nothing is compatible).
 
-            The true setting lies within half_width of the point along the direction with probability
-            1 - alpha (with 2 measurements of a target at least so), where the surfaces are straight that far
+            The true setting is within half_width of the point along the direction with probability
+            1 - alpha (with 2 measurements of a target at least), where the surfaces are straight that far
             (``doe.samples.simultaneous``).
         """
         names, every = tuple(self.goals), self._misfits_at(self.coded_point)
@@ -225,7 +219,7 @@ class JointFit:
         information = slopes.T @ slopes
         values, vectors = np.linalg.eigh(information)
         values, vectors = values[::-1], vectors[:, ::-1]
-        # Rounding leaves eigenvalues of either sign where there is no information at all.
+        # rounding leaves eigenvalues of either sign where there is no information
         values = np.where(values > 1e-12 * max(values[0], np.finfo(float).tiny), values, 0.0)
         largest = np.abs(vectors).argmax(axis=0)
         vectors = vectors * np.sign(vectors[largest, range(len(values))])
@@ -239,17 +233,17 @@ class JointFit:
         return table.assign(half_width=half_width, span=[self._span(vector, mask) for vector in vectors.T])
 
     def _mask(self, names: tuple[str, ...]) -> NDArray[np.bool_]:
-        """Return the cells where some responses agree, by the level of these."""
+        """Return the cells where some responses agree, by their common level."""
         self._check_names(names)
         return self.explored & self._accepted(names, self.misfits).all(axis=1)
 
     def _accepted(self, names: tuple[str, ...], every: Mapping[str, Misfit]) -> NDArray[np.bool_]:
-        """Return which of some responses agree where the misfits were found, shape (points, responses)."""
+        """Return which responses agree, for given misfits, shape (points, responses)."""
         difference = np.column_stack([every[name][0] for name in names])
         return self._together(names).accepted(difference, self._first(names, every))
 
     def _together(self, names: tuple[str, ...]) -> Simultaneous:
-        """Return the joint test of some responses, its level found at fits that err little, more, most."""
+        """Return the joint test of some responses, its level found at small, medium and large errors."""
         if names not in self._tests:
             places = [list(self.goals).index(name) for name in names]
             first = self._first(names, self.misfits)[self.explored]
@@ -294,13 +288,13 @@ class JointFit:
         return Region(self.factors, table, mask, self.resolution, self.extent, self.explored)
 
     def _span(self, direction: NDArray[np.float64], mask: NDArray[np.bool_]) -> float:
-        """Return the shadow of a region's cells on a direction, over that of the region explored."""
+        """Return the extent of a region's cells along a direction, over that of the region explored."""
         shadow = self.cells @ direction
         belonging = shadow[mask]
         return float(np.ptp(belonging) / np.ptp(shadow[self.explored])) if belonging.size else 0.0
 
     def _order(self) -> Iterator[tuple[str, ...]]:
-        """Return the responses so far, from the first on, each time with the one that shrinks most."""
+        """Yield the responses so far, from the first on, each time with the one that shrinks most."""
         added, *left = self.goals
         chosen: tuple[str, ...] = (added,)
         yield chosen
@@ -312,14 +306,7 @@ class JointFit:
 
     def _coded(self, point: Mapping[str, float] | None) -> NDArray[np.float64]:
         """Return a point in coded units: that of the smallest chi2 unless one is given."""
-        if point is None:
-            return self.coded_point
-        point = checked_map("point", point)
-        missing = [factor.name for factor in self.factors if factor.name not in point]
-        if missing:
-            raise DesignError(f"no value for factor {missing[0]!r} in the point {point}")
-        values = {f: checked_number(f"the point's value of {f.name!r}", point[f.name]) for f in self.factors}
-        return np.array([float(factor.to_coded(value)) for factor, value in values.items()])
+        return self.coded_point if point is None else coded_setting("the point", point, self.factors)
 
     def _chi2(self, found: Misfit) -> NDArray[np.float64]:
         return (found[0] / found[1]) ** 2
@@ -329,7 +316,7 @@ class JointFit:
         return chi2 + PULL * float(coded @ coded)
 
     def _refined(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the smallest chi2 of the region explored, searched from a cell; the cell if none is less."""
+        """Return the smallest chi2 of the region explored, searched from a cell, or that cell."""
         inside = {"type": "ineq", "fun": lambda x: self.radius**2 - x @ x, "jac": lambda x: -2.0 * x}
         bounds = [(-self.extent, self.extent)] * len(start)
         options = {"ftol": 1e-12, "maxiter": 200}
@@ -361,10 +348,10 @@ def joint_fit(goals: Mapping[str, Goal], alpha: float = 0.05, resolution: int | 
     """
     if not isinstance(goals, Mapping) or not goals:
         received = "none" if isinstance(goals, Mapping) else repr(goals)
-        raise DesignError(f"a joint fit needs at least one response by its name, got {received}")
+        raise DesignError(f"goals must be at least one response by its name, got {received}")
     for name, goal in goals.items():
         if not isinstance(goal, Goal):
-            raise DesignError(f"response {name!r} of a joint fit is a Goal, got {goal!r}")
+            raise DesignError(f"response {name!r} of a joint fit must be a Goal, got {goal!r}")
     checked_level(alpha)
     if resolution is not None:
         checked_count("resolution", resolution)
@@ -373,8 +360,8 @@ def joint_fit(goals: Mapping[str, Goal], alpha: float = 0.05, resolution: int | 
     for name, other in designs.items():
         if other.factors != design.factors:
             raise DesignError(
-                f"responses are fitted together over the same factors: {first!r} has {design.factors}, "
-                f"{name!r} has {other.factors}"
+                f"responses must have the same factors: {first!r} has {design.factors}, {name!r} has "
+                f"{other.factors}"
             )
     runs = np.vstack([other.points.to_numpy(dtype=np.float64) for other in designs.values()])
     extent = float(np.abs(runs).max())

@@ -1,11 +1,13 @@
-"""The fitted polynomial as c + b'x + x'Bx in coded units: values, gradients, roots along an axis."""
+"""Fitted surfaces as c + b'x + x'Bx in coded units: values, gradients, roots along an axis."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from doe.design.design import Design
 from doe.design.polynomial_terms import Term, term_name
 from doe.errors import DesignError
 
@@ -26,17 +28,13 @@ class QuadraticForm:
     ) -> "QuadraticForm":
         """Return the form of a coded polynomial; the coefficients start with the intercept's.
 
-        Raises
-        ------
-        DesignError
-            A term of third or higher degree.
+        Raises DesignError: a term of third or higher degree.
         """
         terms = tuple(terms)
         higher = [term_name(term) for term in terms if len(term) > 2]
         if higher:
             raise DesignError(
-                "contours, regions and stationary points are those of a second degree; the model has "
-                f"{higher[0]}"
+                f"a model with contours, regions, stationary points must be of second degree, got {higher[0]}"
             )
         constant, *others = coefficients
         slopes, matrix = np.zeros(len(names)), np.zeros((len(names), len(names)))
@@ -58,19 +56,9 @@ class QuadraticForm:
         return self.slopes + 2.0 * self.matrix @ point
 
     def roots_along(self, axis: int, lines: NDArray[np.float64], target: float) -> NDArray[np.float64]:
-        """Return where lines parallel to an axis meet the target, as coordinates on that axis.
+        """Return the roots of lines parallel to an axis as coordinates on it, shape (lines, 2).
 
-        Parameters
-        ----------
-        axis : int
-        lines : array, shape (lines, factors)
-            A point of each line.
-        target : float
-
-        Returns
-        -------
-        array, shape (lines, 2)
-            NaN or infinite where there is no root.
+        ``lines`` holds a point of each line, shape (lines, factors). Missing roots are NaN or infinite.
         """
         base = lines.copy()
         base[:, axis] = 0.0
@@ -81,3 +69,31 @@ class QuadraticForm:
             # q/a and c/q lose no digits where a is near zero and one root runs off to infinity.
             q = -0.5 * (b + np.where(b < 0.0, -1.0, 1.0) * np.sqrt(b * b - 4.0 * a * c))
             return np.column_stack([q / a, c / q])
+
+
+class FittedSurface(Protocol):
+    """A polynomial of second degree that was fitted to a design, such as ``doe.Surface``."""
+
+    @property
+    def design(self) -> Design:
+        """The design, with its factors and their coding."""
+
+    @property
+    def quadratic_form(self) -> QuadraticForm:
+        """The polynomial in coded units."""
+
+    @property
+    def residual_df(self) -> float:
+        """Degrees of freedom of the residual."""
+
+    def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean and its standard error at coded points, shape (points, factors)."""
+
+
+def unselected(surface: FittedSurface) -> FittedSurface:
+    """Return the model that intervals and regions come from.
+
+    After the data chose terms this is the model before (``doe.Surface.unselected``): the errors of the chosen
+    one ignore the choice and are too small. For any other surface it is the surface itself.
+    """
+    return getattr(surface, "unselected", surface)

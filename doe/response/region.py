@@ -9,37 +9,37 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from doe.arguments import checked_count, checked_df, checked_number
+from doe.design.design import natural_points
 from doe.design.factors import Factor
-from doe.design.points import natural_points
 from doe.errors import DesignError
-from doe.response.fitted import FittedSurface, unselected
+from doe.response.quadratic import FittedSurface, unselected
 from doe.samples.sample import Sample
 from doe.samples.two_errors import TwoErrors
 
 CELL_BUDGET = 160_000
-"""Cells that a region is sampled on, over all factors."""
+"""Number of cells of a region, over all factors."""
 
 CELLS_MOST = 20_000_000
-"""Most cells that a region may be asked for: they are held in memory at once."""
+"""Largest number of cells that may be requested: they are held in memory at once."""
 
 CELLS_PER_FACTOR = 2_000
-"""Most cells along one factor."""
+"""Largest number of cells along one factor."""
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Cells of a regular grid over the coded box -extent..+extent and which of them belong."""
+    """Cells of a regular grid over the coded box -extent..+extent, with their membership."""
 
     factors: tuple[Factor, ...]
     coded: pd.DataFrame
     """Centers of all cells; the last factor varies fastest."""
     mask: NDArray[np.bool_]
-    """Which cells belong, shape (cells,)."""
+    """True for cells of the region, shape (cells,)."""
     resolution: int
     """Cells along each factor."""
     extent: float
     explored: NDArray[np.bool_] | None = None
-    """Which cells were in question; None: the whole box."""
+    """True for the cells that were tested; None: the whole box."""
 
     @cached_property
     def natural(self) -> pd.DataFrame:
@@ -48,30 +48,24 @@ class Region:
 
     @property
     def fraction(self) -> float:
-        """Share of the cells in question that belongs."""
+        """Share of the tested cells that belongs."""
         explored = self.mask.size if self.explored is None else np.count_nonzero(self.explored)
         return float(np.count_nonzero(self.mask) / explored)
 
     def projection(self, x: str, y: str) -> NDArray[np.bool_]:
-        """Return the region's shadow on the plane of two factors, shape (cells of x, cells of y).
-
-        A cell of the plane belongs when the region holds it for some values of the other factors.
-        """
+        """Return the region's projection on the plane of two factors, shape (cells of x, cells of y)."""
         box, names = self._box(x, y)
         others = tuple(axis for axis, name in enumerate(names) if name not in (x, y))
         shadow = np.asarray(box.any(axis=others))
         return shadow if names.index(x) < names.index(y) else shadow.T
 
     def section(self, x: str, y: str, at: Mapping[str, float]) -> NDArray[np.bool_]:
-        """Return the region's cut by the plane of two factors, shape (cells of x, cells of y).
-
-        The other factors are held in the cells nearest to the natural values ``at``.
-        """
+        """Return the region's cut by the plane of two factors, the others held near ``at``."""
         box, names = self._box(x, y)
         held = {}
         for name in (name for name in names if name not in (x, y)):
             if name not in at:
-                raise DesignError(f"a section holds every other factor: {name!r} has no value in {dict(at)}")
+                raise DesignError(f"a section must hold every other factor: no {name!r} in {dict(at)}")
             value = checked_number(f"the section's value of {name!r}", at[name])
             held[name] = int(np.abs(self.axis(name) - value).argmin())
         cut = np.asarray(box[tuple(slice(None) if name in (x, y) else held[name] for name in names)])
@@ -88,16 +82,16 @@ class Region:
         )
 
     def _box(self, x: str, y: str) -> tuple[NDArray[np.bool_], list[str]]:
-        """Return which cells belong along an axis for each factor, and the factors' names."""
+        """Return the mask with an axis for each factor, and the factors' names."""
         names = [factor.name for factor in self.factors]
         unknown = [name for name in (x, y) if name not in names]
         if unknown or x == y:
-            raise DesignError(f"a projection takes two of {', '.join(names)}, got {x!r} and {y!r}")
+            raise DesignError(f"factors of a plane must be two of {', '.join(names)}, got {x!r} and {y!r}")
         return self.mask.reshape((self.resolution,) * len(names)), names
 
     @property
     def ranges(self) -> pd.DataFrame:
-        """Natural low and high of each factor over the cells that belong, to their edges; NaN when none does.
+        """Natural low and high of each factor over the cells that belong, to their edges; NaN without cells.
 
         A range alone does not make a setting compatible: the factors trade off against one another.
         """
@@ -119,28 +113,23 @@ def compatible_region(
     """Return the settings whose fitted mean and the measured target do not differ significantly.
 
     A setting belongs when |mean - target| <= c sqrt(se_fit^2 + se_target^2), with c from the degrees of
-    freedom of both errors and their shares (``doe.samples.two_errors``). So the true setting belongs with probability
-    1 - alpha, where the model holds: .94 to .96 for .95 with 3 measurements or more; with 2 at least .94, up
-    to .98. Of a surface whose terms the data chose (``doe.Surface.reduce``) it is the model
-    before the choice that counts.
+    freedom of both errors and their shares (``doe.samples.two_errors``). So the true setting belongs with
+    probability 1 - alpha, where the model holds: .94 to .96 for .95 with 3 measurements or more; with 2 at
+    least .94, up to .98. For a surface whose terms the data chose (``doe.Surface.reduce``) the model before
+    the choice counts.
 
     Parameters
     ----------
-    surface : FittedSurface
     target : float or Sample
-        A Sample brings its standard error and degrees of freedom.
+        A Sample has its standard error and degrees of freedom.
     target_se, target_df : float
         Standard error of the target's mean and its degrees of freedom, when the target is a number.
-    alpha : float
     extent : float
         Coded half width of the box.
     resolution : int, optional
         Cells along each factor.
 
-    Raises
-    ------
-    DesignError
-        A target, an error, a level or an extent that is no finite number in its range.
+    Raises DesignError: a target, an error, a level or an extent out of its range.
     """
     goal = _goal(target, target_se, target_df)
     points, count = box_cells(len(surface.design.factors), extent, resolution)
@@ -150,7 +139,7 @@ def compatible_region(
 
 
 def agrees(surface: FittedSurface, coded: ArrayLike, target: Sample, alpha: float = 0.05) -> bool:
-    """Tell if a target does not contradict the fitted mean at one coded point, by the region's rule."""
+    """Return True if a target does not contradict the fitted mean at one coded point, by that rule."""
     difference, error, share, errors = misfit(surface, coded, *_goal(target, 0.0, np.inf))
     return bool(np.abs(difference[0]) <= errors.critical(share, alpha)[0] * error[0])
 
@@ -158,13 +147,9 @@ def agrees(surface: FittedSurface, coded: ArrayLike, target: Sample, alpha: floa
 def misfit(
     surface: FittedSurface, coded: ArrayLike, goal: float, goal_se: float, goal_df: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], TwoErrors]:
-    """Return how fit and target differ at coded points.
+    """Return fitted mean less target at coded points, its error, the target's share of it, and the rule.
 
-    Returns
-    -------
-    tuple
-        Fitted mean less target, its standard error, the target's share of that error's square, and the rule
-        that says from where on such a difference is significant.
+    The share is that of the error's square; the rule gives the significance of such a difference.
     """
     basis = unselected(surface)
     mean, se = basis.evaluate(coded)
@@ -191,7 +176,7 @@ def band(
     extent: float = 1.0,
     resolution: int | None = None,
 ) -> Region:
-    """Return the settings whose fitted mean lies within target +- half_width, the fit taken as exact."""
+    """Return the settings whose fitted mean is within target +- half_width, the fit taken as exact."""
     goal = checked_number("target", target)
     reach = checked_number("half_width", half_width, least=0.0)
     points, count = box_cells(len(surface.design.factors), extent, resolution)
@@ -210,7 +195,7 @@ def box_cells(
         count = checked_count("resolution", resolution)
     if count**factor_count > CELLS_MOST:
         raise DesignError(
-            f"a region has at most {CELLS_MOST} cells: {count} along each of {factor_count} factors are more"
+            f"a region must have at most {CELLS_MOST} cells, got {count} along each of {factor_count} factors"
         )
     centers = extent * ((2.0 * np.arange(count) + 1.0) / count - 1.0)
     cells = np.stack(np.meshgrid(*[centers] * factor_count, indexing="ij"), axis=-1)

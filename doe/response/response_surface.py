@@ -21,9 +21,8 @@ from doe.arguments import (
 )
 from doe.design.anova import ErrorTerm, anova_table, block_columns, block_sum, least_squares, pure_error
 from doe.design.coefficients import anova_by_order, coefficient_table, significant_words, summary_text
-from doe.design.design import Design, observations
+from doe.design.design import Design, coded_points, observations
 from doe.design.factors import Category, two_level_factors
-from doe.design.points import coded_points
 from doe.design.polynomial_terms import (
     INTERCEPT,
     Term,
@@ -37,7 +36,8 @@ from doe.design.polynomial_terms import (
     term_name,
 )
 from doe.errors import DesignError
-from doe.response import contour, region, surface_points
+from doe.response import contour as contours
+from doe.response import region, surface_points
 from doe.response.quadratic import QuadraticForm
 from doe.samples.sample import Sample
 
@@ -46,20 +46,19 @@ from doe.samples.sample import Sample
 class Surface:
     """A polynomial fitted to a design's response; made by ``fit_surface``.
 
-    Terms are written "E", "E:F" and "E^2". The model is hierarchical: a term stays while a multiple of it is
-    in.
+    Terms are written "E", "E:F" and "E^2". The model is hierarchical: it keeps every part of a term.
     """
 
     design: Design
     points: pd.DataFrame
-    """Coded settings, one row an observation."""
+    """Coded settings, one row per observation."""
     response: pd.Series
-    """One row an observation, labelled by its run."""
+    """One row per observation, labelled by its run."""
     terms: tuple[Term, ...]
     dropped: tuple[str, ...] = ()
-    """Terms that were taken out, in that order."""
+    """Removed terms, in that order."""
     selected_from: "Surface | None" = None
-    """The model from which ``reduce`` chose these terms by the data; None where nothing was chosen so."""
+    """Model from which ``reduce`` chose these terms by the data; None without such a choice."""
 
     def __post_init__(self) -> None:
         if len(self.points) <= len(self.terms) + 1:
@@ -67,16 +66,16 @@ class Surface:
                 f"too few runs for the terms: {len(self.points)} observations leave no residual for "
                 f"intercept, {', '.join(map(term_name, self.terms))}"
             )
-        self.fit  # noqa: B018  (columns that cannot be told apart are an error now, not at the first use)
+        self.fit  # noqa: B018  (dependent columns are an error now, not at the first use)
 
     @property
     def unselected(self) -> "Surface":
-        """The model before the data chose terms, this one where they chose none: its intervals hold."""
+        """Model before the data chose terms, whose intervals hold; the surface itself without a choice."""
         return self if self.selected_from is None else self.selected_from
 
     @cached_property
     def fit(self) -> RegressionResults:
-        """The statsmodels least squares fit in coded units: intercept, terms, then the blocks' columns."""
+        """Least squares fit (statsmodels) in coded units: intercept, terms, then the blocks' columns."""
         matrix = model_matrix(self.points, self.terms)
         blocks = block_columns(self.blocks, matrix.index)
         return least_squares(pd.concat([matrix, blocks], axis=1), self.response)
@@ -117,7 +116,7 @@ class Surface:
             "in natural units": self.equation(digits=4),
         }
         if self.dropped:
-            facts["taken out"] = ", ".join(self.dropped)
+            facts["removed"] = ", ".join(self.dropped)
         if self.selected_from is not None:
             facts["chosen by the data"] = (
                 "se and p of what stayed are too small; predict and regions take those of the model before"
@@ -174,7 +173,7 @@ class Surface:
 
     @cached_property
     def leverage(self) -> pd.Series:
-        """Diagonal of the hat matrix: how far each observation draws its own fit."""
+        """Diagonal of the hat matrix: the influence of each observation on its own fit."""
         matrix = self.fit.model.exog
         hat = np.einsum("ij,jk,ik->i", matrix, self.fit.normalized_cov_params, matrix)
         return pd.Series(hat, index=self.response.index, name="leverage")
@@ -216,15 +215,15 @@ class Surface:
 
     @property
     def adequate_precision(self) -> float:
-        """Range of the fitted responses over their mean standard error (Box and Draper); wanted above 4."""
+        """Range of the fitted responses over their mean standard error (Box and Draper); should exceed 4."""
         mean_variance = len(self.fit.params) * self.residual_ms / len(self.response)
         return float((self.fitted.max() - self.fitted.min()) / np.sqrt(mean_variance))
 
     def drop(self, *names: str) -> "Surface":
-        """Return the refit without these terms; raise DesignError when one is part of a term that stays.
+        """Return the refit without these terms; raise DesignError for a part of a term that stays.
 
-        The refit's intervals take it as given that the terms are zero: name them before the data are seen.
-        To leave out what the data do not show, use ``reduce``.
+        The refit's intervals take it as given that the terms are zero: name them before the data are seen. To
+        leave out insignificant terms, use ``reduce``.
         """
         out = [find_term(name, self.terms) for name in names]
         kept = tuple(term for term in self.terms if term not in out)
@@ -232,19 +231,17 @@ class Surface:
             multiples = [term_name(other) for other in kept if contains(other, term)]
             if multiples:
                 raise DesignError(
-                    f"the model stays hierarchical: {term_name(term)} cannot go "
-                    f"while {', '.join(multiples)} stays"
+                    f"the model is hierarchical: {term_name(term)} is part of {multiples[0]}, which stays"
                 )
         return replace(self, terms=kept, dropped=(*self.dropped, *map(term_name, out)))
 
     def reduce(self, alpha: float = 0.05) -> "Surface":
         """Return the model after hierarchical backward elimination.
 
-        Again and again the least significant term goes, among those with p above alpha that are part of no
-        other. The coefficients, means and contours are those of the terms that stay. Standard errors,
-        intervals and regions are those of the model before: they know that the data chose the terms, and hold
-        their level (those of the terms that stay cover .77 to .93 instead of .95). The p values of the terms
-        that stay do not know it.
+        The least significant term goes repeatedly, among those with p above alpha that are part of no other.
+        The coefficients, means and contours are those of the terms that stay. Standard errors, intervals and
+        regions are those of the model before and hold their level (those of the terms that stay cover .77 to
+        .93 instead of .95). The p values of the terms that stay ignore the choice.
         """
         checked_level(alpha)
         surface = self
@@ -282,7 +279,7 @@ class Surface:
         Parameters
         ----------
         points : DataFrame with a column for each factor, or one point as a mapping
-            In natural units (``coded``: in coded ones).
+            Natural units, or coded ones with ``coded``.
         alpha : float
             The intervals hold with probability 1 - alpha.
 
@@ -296,7 +293,7 @@ class Surface:
         Raises
         ------
         DesignError
-            A factor without value, a value that is no finite number, a level outside 0 to 1.
+            A factor without value, a value that is not finite, a level outside 0 to 1.
         """
         level = checked_level(alpha)
         table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([checked_map("points", points)])
@@ -335,43 +332,20 @@ class Surface:
         plain = [factor for factor in self.design.factors if not isinstance(factor, Category)]
         return inside.assign(**coded_points(plain, inside))
 
-    def contour(self, target: float, extent: float = 1.0, resolution: int | None = None) -> pd.DataFrame:
-        """Return points of the target contour, natural units (see ``doe.response.contour.contour``)."""
-        return contour.contour(self, target, extent, resolution)
-
-    def nearest(self, target: float, to: Mapping[str, float] | None = None, extent: float = 1.0) -> pd.Series:
-        """Return the contour's point nearest to the design center, natural (see ``doe.response.surface_points.nearest``)."""
-        return surface_points.nearest(self, target, to, extent)
-
-    def stationary_point(self) -> surface_points.StationaryPoint:
-        """Return where the gradient vanishes, and its kind (see ``doe.response.surface_points.stationary_point``)."""
-        return surface_points.stationary_point(self)
-
-    def compatible_region(
-        self,
-        target: float | Sample,
-        target_se: float = 0.0,
-        target_df: float = np.inf,
-        alpha: float = 0.05,
-        extent: float = 1.0,
-        resolution: int | None = None,
-    ) -> region.Region:
-        """Return the settings that the target does not contradict (see ``doe.response.region.compatible_region``)."""
-        return region.compatible_region(self, target, target_se, target_df, alpha, extent, resolution)
+    # functions of a fitted surface, as methods
+    contour = contours.contour
+    nearest = surface_points.nearest
+    stationary_point = surface_points.stationary_point
+    compatible_region = region.compatible_region
+    band = region.band
 
     def agrees(
         self, point: Mapping[str, float], target: Sample, alpha: float = 0.05, coded: bool = False
     ) -> bool:
-        """Tell if a target does not contradict one setting: the rule of ``compatible_region`` there."""
+        """Return True if a target does not contradict one setting: the rule of ``compatible_region``."""
         one = pd.DataFrame([checked_map("point", point)])
         inside = self._coded_table(one, checked_flag("coded", coded))
         return region.agrees(self, inside.to_numpy(), target, alpha)
-
-    def band(
-        self, target: float, half_width: float, extent: float = 1.0, resolution: int | None = None
-    ) -> region.Region:
-        """Return where the fitted mean lies within target +- half_width (the fit taken as exact)."""
-        return region.band(self, target, half_width, extent, resolution)
 
 
 def fit_surface(design: Design, response: ArrayLike, model: str | Iterable[str] = "quadratic") -> Surface:
@@ -380,7 +354,7 @@ def fit_surface(design: Design, response: ArrayLike, model: str | Iterable[str] 
     Parameters
     ----------
     design : Design
-        Its blocks, where it has any, are a term of the model; dummy columns are not used.
+        Its blocks are a term of the model; dummy columns are not used.
     response : array-like, shape (runs,) or (runs, replicates)
     model : {"first-order", "interaction", "quadratic", "three-factor"} or terms
         Linear terms; with the products of two factors; with the squares too; with products of two and three
@@ -390,7 +364,7 @@ def fit_surface(design: Design, response: ArrayLike, model: str | Iterable[str] 
     ------
     DesignError
         A response that is not finite or does not vary, too few runs for the terms, or terms that the runs
-        cannot tell apart.
+        cannot distinguish.
     """
     checked_kind("design", design, Design)
     coded, values = observations(design, response)

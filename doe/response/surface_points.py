@@ -1,4 +1,4 @@
-"""Single points of a surface: the one nearest to the center on the target contour, and the stationary one."""
+"""Single points of a surface: the nearest one on the target contour, and the stationary one."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,24 +9,23 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize
 
-from doe.arguments import checked_map, checked_number
-from doe.design.points import natural_points
+from doe.arguments import checked_number
+from doe.design.design import coded_setting, natural_points
 from doe.errors import DesignError, TargetError
 from doe.response.contour import contour_points
-from doe.response.fitted import FittedSurface
-from doe.response.quadratic import QuadraticForm
+from doe.response.quadratic import FittedSurface, QuadraticForm
 from doe.response.region import box_cells
 
 NEAREST_STARTS = 8
 """Points of the contour from which the nearest one is refined."""
 
 FLAT_RATIO = 1e-9
-"""Curvature relative to the largest coefficient below which a direction counts as straight."""
+"""Curvature relative to the largest coefficient below which a direction is straight."""
 
 
 @dataclass(frozen=True, eq=False)
 class StationaryPoint:
-    """Point at which the gradient of a quadratic surface vanishes."""
+    """Point of zero gradient on a quadratic surface."""
 
     coded: pd.Series
     natural: pd.Series
@@ -39,47 +38,28 @@ class StationaryPoint:
 
     @property
     def inside(self) -> bool:
-        """It lies in the coded box -1..+1."""
+        """True if it is in the coded box -1..+1."""
         return bool((self.coded.abs() <= 1.0).all())
 
 
 def nearest(
     surface: FittedSurface, target: float, to: Mapping[str, float] | None = None, extent: float = 1.0
 ) -> pd.Series:
-    """Return the point of the target contour with the smallest coded distance to a point.
+    """Return the point of the target contour with the smallest coded distance to a point, natural.
 
     Parameters
     ----------
-    surface : FittedSurface
-    target : float
     to : mapping of natural values by factor, optional
         Default: the design's center.
     extent : float
-        Coded half width of the box that the point must lie in.
+        Coded half width of the box of the point.
 
-    Returns
-    -------
-    Series
-        Natural value by factor.
-
-    Raises
-    ------
-    TargetError
-        The fitted surface does not reach the target in the box.
-    DesignError
-        A target, an extent or a point that is no finite number.
+    Raises TargetError: the fitted surface does not reach the target in the box.
     """
     checked_number("target", target)
     checked_number("extent, the coded half width of the box,", extent, above=0.0)
     factors = surface.design.factors
-    origin = np.zeros(len(factors))
-    if to is not None:
-        to = checked_map("the point to be near to", to)
-        missing = [name for name in surface.design.names if name not in to]
-        if missing:
-            raise DesignError(f"no value for factor {missing[0]!r} in the point to be near to: {dict(to)}")
-        values = [checked_number(f"the value of {f.name!r} to be near to", to[f.name]) for f in factors]
-        origin = np.array([factor.to_coded(value) for factor, value in zip(factors, values, strict=True)])
+    origin = np.zeros(len(factors)) if to is None else coded_setting("the point to be near to", to, factors)
     starts = contour_points(surface, target, extent, None).to_numpy()
     if not len(starts):
         mean, _ = surface.evaluate(box_cells(len(factors), extent)[0])
@@ -94,12 +74,9 @@ def nearest(
 
 
 def stationary_point(surface: FittedSurface) -> StationaryPoint:
-    """Return the point where the gradient vanishes (canonical analysis, Box and Wilson 1951).
+    """Return the point of zero gradient (canonical analysis, Box and Wilson 1951).
 
-    Raises
-    ------
-    DesignError
-        The surface is straight along some direction, so that there is no single such point.
+    Raises DesignError: the surface is straight along some direction, so that there is no single such point.
     """
     form = surface.quadratic_form
     curvatures, directions = np.linalg.eigh(form.matrix)
@@ -107,7 +84,7 @@ def stationary_point(surface: FittedSurface) -> StationaryPoint:
     if np.abs(curvatures).min() <= FLAT_RATIO * scale:
         direction = directions[:, np.abs(curvatures).argmin()].round(3)
         raise DesignError(
-            "a stationary point needs curvature in every direction; the fitted surface is straight along "
+            "a stationary point requires curvature in every direction; the fitted surface is straight along "
             f"{dict(zip(surface.design.names, direction.tolist(), strict=True))} (coded)"
         )
     point = np.linalg.solve(form.matrix, -0.5 * form.slopes)

@@ -1,16 +1,13 @@
-"""A surface carried over to another process: shifted and scaled by what a few runs there show.
+"""A surface in another process: shifted and scaled by a few runs there.
 
 Two simulators of one test, or a simulator and a laboratory, seldom agree, but their responses to the factors
-are of one shape: y = t + shift + scale (s(x) - t), with s the surface of the first and t a level to count
-from, such as the target. Shift and scale are estimated by generalized least squares. Their errors come from
-both sides: the noise of the runs, estimated from them by restricted likelihood, and that of the surface,
-which moves its values together. That the scale is 1 within a quarter is taken as known beforehand (mixed
-estimation; Theil and Goldberger 1961), so that noise alone cannot make it next to nothing. What the runs tell
-of the surface beyond shift and scale moves it within its own errors (best linear unbiased prediction;
-Harville 1977, Kennedy and O'Hagan 2001 with a constant scale).
+are of one shape: y = t + shift + scale (s(x) - t), with s the surface of the first and t a reference level,
+e.g. the target. Shift and scale are estimated by generalized least squares, with the noise of the runs,
+estimated by restricted likelihood, and the common error of the surface. That the scale is 1 within a quarter
+is prior knowledge (mixed estimation; Theil and Goldberger 1961), so that noise alone cannot make it nearly
+zero. Further information of the runs moves the surface within its own errors (best linear unbiased
+prediction; Harville 1977, Kennedy and O'Hagan 2001 with a constant scale).
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -28,56 +25,53 @@ from doe.arguments import (
     checked_df,
     checked_kind,
     checked_level,
-    checked_map,
     checked_number,
     checked_points,
     real_array,
 )
-from doe.design.design import Design
-from doe.design.points import coded_points, natural_points
+from doe.design.design import Design, coded_points, coded_setting, natural_points
 from doe.design.polynomial_terms import INTERCEPT, model_matrix
 from doe.errors import DesignError
 from doe.response import region, surface_points
 from doe.response.quadratic import QuadraticForm
 from doe.response.response_surface import Surface
-from doe.samples.sample import Sample
 
 SCALE_SD = 0.25
-"""Standard deviation of the scale about 1 before any run: solvers of one test are alike so far."""
+"""Prior standard deviation of the scale about 1."""
 
 FARTHEST = 1e4
-"""Distance of the level from the responses over their range from which on shift and scale are one."""
+"""Distance of the level from the responses over their range above which shift and scale are inseparable."""
 
 LEAST_RUNS = 4
-"""Fewest runs that leave a spread beside shift and scale."""
+"""Least number of runs: with shift and scale estimated they leave a spread."""
 
 ROUNDS = 20
-"""Rounds of estimating the scale, which weighs the surface's own error, at the most."""
+"""Largest number of rounds of estimating the scale, which weighs the surface's own error."""
 
 SETTLED = 1e-3
-"""Change of the scale from one round to the next that weighs nothing."""
+"""Change of the scale that ends these rounds."""
 
 LOWEST_NOISE = 1e-3
-"""Least standard deviation of a run that is looked for, as a part of the responses' spread."""
+"""Least standard deviation of a run in the search, as a part of the responses' spread."""
 
 
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    """A surface as it is in another process; made by ``transfer``. It has contours, optima and regions."""
+    """A surface in another process; made by ``transfer``. It has contours, optima and regions."""
 
     source: Surface
     level: float
-    """Response that shift and scale count from."""
+    """Response that shift and scale are relative to."""
     points: NDArray[np.float64]
     """Coded settings of the runs of the other process, (runs, factors)."""
     response: NDArray[np.float64]
-    """Their responses, (runs,)."""
+    """Responses of the runs, (runs,)."""
     noise: float
     """Standard deviation of one of them."""
     weight: float
-    """Scale with which the surface's own error is weighed."""
+    """Scale that weighs the surface's own error."""
     scale_sd: float = SCALE_SD
-    """Standard deviation of the scale about 1 that was taken as known beforehand; infinite: nothing was."""
+    """Prior standard deviation of the scale about 1; infinite: no prior."""
 
     @property
     def design(self) -> Design:
@@ -90,12 +84,12 @@ class Transfer:
 
     @property
     def shift(self) -> float:
-        """Response of the other process where the surface has the level, less the level."""
+        """Difference of the processes where the surface has the level."""
         return float(self._fit.params[0])
 
     @property
     def scale(self) -> float:
-        """Change of the other process's response where the surface's changes by one."""
+        """Change of the other process's response per change of the surface's."""
         return float(self._fit.params[1])
 
     @property
@@ -112,7 +106,7 @@ class Transfer:
         }
 
     def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return mean in the other process and its standard error at coded points, (points, factors)."""
+        """Return mean and standard error in the other process at coded points, (points, factors)."""
         points = checked_points(coded, len(self.design.names))
         own, common = self._columns(points), self._common(points)
         weighed = np.linalg.solve(self._covariance, np.column_stack([self._leftover, common.T]))
@@ -135,26 +129,19 @@ class Transfer:
         values[0] += self.level + self.shift - self.scale * self.level
         return QuadraticForm.of(self.design.names, terms[1:], values)
 
-    def nearest(self, target: float, to: dict[str, float] | None = None, extent: float = 1.0) -> pd.Series:
-        """Return the target contour's point nearest to a point, natural (see ``doe.response.surface_points.nearest``)."""
-        return surface_points.nearest(self, target, to, extent)
-
-    def compatible_region(
-        self, target: float | Sample, alpha: float = 0.05, extent: float = 1.0
-    ) -> region.Region:
-        """Return the settings that the target does not contradict (see ``doe.response.region.compatible_region``)."""
-        return region.compatible_region(self, target, alpha=alpha, extent=extent)
+    nearest = surface_points.nearest
+    compatible_region = region.compatible_region
 
     # ---- parts of the model --------------------------------------------------------------------------------
 
     def _columns(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Columns of shift and scale, the level taken off by the response: (points, 2)."""
+        """Return the columns of shift and scale relative to the level, (points, 2)."""
         table = pd.DataFrame(points, columns=self.design.names)
         values = model_matrix(table, self.source.terms).to_numpy() @ self.source.coded_coefficients.to_numpy()
         return np.column_stack([np.ones(len(points)), values - self.level])
 
     def _rows(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Terms of the model whose errors are the surface's, (points, terms)."""
+        """Return the terms of the model whose errors are the surface's, (points, terms)."""
         table = pd.DataFrame(points, columns=self.design.names)
         return model_matrix(table, self.source.unselected.terms).to_numpy()
 
@@ -165,7 +152,7 @@ class Transfer:
         return whole.fit.cov_params().to_numpy()[:count, :count]
 
     def _common(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Covariance of the surface's error at points with that at the runs, (points, runs)."""
+        """Return the covariance of the surface's error at points and at the runs, (points, runs)."""
         return self.weight**2 * self._rows(points) @ self._surface_covariance @ self._rows(self.points).T
 
     @cached_property
@@ -179,7 +166,7 @@ class Transfer:
 
 
 def _with_prior(found: Transfer) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return responses and columns of shift and scale, with what is known of the scale as one more run."""
+    """Return responses and columns of shift and scale, with the prior of the scale as one more run."""
     below, columns = found.response - found.level, found._columns(found.points)
     if not np.isfinite(found.scale_sd):
         return below, columns
@@ -205,20 +192,19 @@ def transfer(
 
     Parameters
     ----------
-    source : Surface
-    runs : DataFrame, one row a run
+    runs : DataFrame, one row per run
         A column for each factor, natural units.
     response : array-like, shape (runs,)
     level : float
-        Response that shift and scale count from: the target. They are then nearly uncorrelated.
+        Response that shift and scale are relative to: the target. They are then nearly uncorrelated.
     scale_sd : float
-        Standard deviation of the scale about 1 before any run; infinite: nothing is known of it.
+        Prior standard deviation of the scale about 1; infinite: no prior.
 
     Raises
     ------
     DesignError
-        Fewer than four runs, a value that is not finite, or runs that cannot tell shift from scale: on all of
-        them the surface is the same.
+        Fewer than four runs, a value that is not finite, or runs with equal values of the surface, which
+        cannot separate shift from scale.
     """
     checked_kind("source", source, Surface)
     checked_kind("runs", runs, pd.DataFrame)
@@ -230,19 +216,19 @@ def transfer(
     table = coded_points(source.design.factors, pd.DataFrame(natural))
     points = pd.DataFrame(table)[source.design.names].to_numpy(dtype=np.float64)
     if values.shape != (len(points),):
-        raise DesignError(f"{len(points)} runs need one response each, got the shape {values.shape}")
+        raise DesignError(f"response must be one number for each of {len(points)} runs, got {values.shape}")
     if len(points) < LEAST_RUNS:
-        raise DesignError(f"a surface is carried over by {LEAST_RUNS} runs or more, got {len(points)}")
+        raise DesignError(f"runs must be {LEAST_RUNS} or more, got {len(points)}")
     if not (np.isfinite(values).all() and np.isfinite(points).all()):
-        raise DesignError("runs and responses must be finite, got others")
+        raise DesignError("runs and responses must be finite, got NaN or infinity")
     distance = np.abs(checked_number("the level", level) - values).max()
     if distance > FARTHEST * max(float(np.ptp(values)), float(np.ptp(source.fitted))):
-        raise DesignError(f"the level lies among the responses or near them, got {level:g}")
+        raise DesignError(f"the level must be among the responses or near them, got {level:g}")
     checked_df("scale_sd, the standard deviation of the scale,", scale_sd)
     found = Transfer(source, float(level), points, values, 1.0, 1.0, scale_sd)
     if np.ptp(found._columns(points)[:, 1]) <= 1e-9 * max(1.0, float(np.ptp(source.fitted))):
         raise DesignError(
-            "runs must lie where the surface differs, to tell shift from scale; all have one value"
+            "runs must differ in their values of the surface, to separate shift and scale; all have one value"
         )
     for _ in range(ROUNDS):
         before = found.weight
@@ -254,10 +240,10 @@ def transfer(
 
 
 def _with_noise(found: Transfer) -> Transfer:
-    """Return it with the noise of the highest restricted likelihood at its weight."""
+    """Return the transfer with the noise of the highest restricted likelihood at its weight."""
     spread = float(np.std(found.response, ddof=1))
     if not spread > 0.0:
-        raise DesignError("no noise can be told from responses that are all the same")
+        raise DesignError("responses must differ, to show their noise; all are the same")
     below, columns = _with_prior(found)
     common = found._common(found.points)
 
@@ -277,41 +263,28 @@ def _with_noise(found: Transfer) -> Transfer:
 def transfer_points(
     source: Surface, at: dict[str, float], count: int, step: float = 0.7, extent: float = 1.0, turn: int = 0
 ) -> pd.DataFrame:
-    """Place runs around a point of a surface: there, across its contour, and along it.
+    """Place runs around a point of a surface: there, across its contour, and along it; in natural units.
 
-    Across tells the scale, there and across together the shift; along shows if the factors trade off there as
-    here. The order is there, up, down, and to both sides, again and again, so that any count is balanced as
-    far as it goes.
+    Runs across determine the scale, those there and across together the shift; runs along show if the factors
+    trade off alike. The order is there, up, down, and to both sides, repeatedly, so that any count is as
+    balanced as possible.
 
     Parameters
     ----------
-    source : Surface
     at : mapping of natural values by factor
-    count : int
-    step : float
-        Coded distance of the outer runs.
-    extent : float
-        Coded half width of the box that all lie in, as far as the point itself does.
+    step, extent : float
+        Coded distance of the outer runs, and coded half width of the box of all runs.
     turn : int
-        Number of the direction along the contour, of those that more than two factors have.
-
-    Returns
-    -------
-    DataFrame
-        Natural units, a column a factor, one row a run.
+        Number of the direction along the contour, if there are more than two factors.
     """
     checked_kind("source", source, Surface)
-    names, at = source.design.names, checked_map("at", at)
-    missing = [name for name in names if name not in at]
-    if missing:
-        raise DesignError(f"no value for factor {missing[0]!r} in the point {at}")
+    names = source.design.names
+    origin = coded_setting("at", at, source.design.factors)
     count, turn = checked_count("count", count, most=MOST), checked_count("turn", turn, least=0)
     step, extent = checked_number("step", step, above=0.0), checked_number("extent", extent, above=0.0)
-    values = [checked_number(f"the point's value of {name!r}", at[name]) for name in names]
-    origin = np.array([float(f.to_coded(x)) for f, x in zip(source.design.factors, values, strict=True)])
     slope = source.quadratic_form.gradient(origin)
     if not np.linalg.norm(slope) > 0.0:
-        raise DesignError(f"a surface is carried over at a point where it rises or falls, not at {at}")
+        raise DesignError(f"the surface must rise or fall at the point, got {at}")
     across = slope / np.linalg.norm(slope)
     directions = [np.zeros(len(names)), across, -across]
     if len(names) > 1:
@@ -326,7 +299,7 @@ def transfer_points(
 def _inside(
     origin: NDArray[np.float64], direction: NDArray[np.float64], step: float, box: float
 ) -> NDArray[np.float64]:
-    """Return the point a step away, or as far as the box lets it."""
+    """Return the point a step away, or as far as the box allows."""
     with np.errstate(divide="ignore", invalid="ignore"):
         room = np.where(direction != 0.0, (box - origin * np.sign(direction)) / np.abs(direction), np.inf)
     return origin + min(step, float(room.min())) * direction

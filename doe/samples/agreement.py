@@ -1,4 +1,4 @@
-"""Agreement of two sets of numbers for the same runs, with the noise of both taken out."""
+"""Agreement of two sets of numbers for the same runs, with the noise of both removed."""
 
 import math
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ DRAWS = 4_000
 """Drawn pairs behind the ceiling of the rank correlation: an end of its interval is known to 3 % of it."""
 
 MANY_NOISES = 1e4
-"""Mean square over the noise variance from which on the noise is taken out as it is."""
+"""Mean square over the noise variance above which the noise is subtracted."""
 
 CORRELATIONS = np.tanh(np.linspace(-4.0, 4.0, 65))
-"""Of the normal pairs among which the interval of a rank correlation is found."""
+"""Correlations of normal pairs among which the interval of a rank correlation is found."""
 
 SEED = 1
-"""Of the drawing: the same numbers give the same ceiling."""
+"""Seed of the draws: equal numbers give equal ceilings."""
 
 
 @dataclass(frozen=True)
@@ -41,15 +41,14 @@ class Estimate:
 class Agreement:
     """Agreement of values with reference values, run by run; made by ``agreement``.
 
-    The intervals hold for runs that are drawn: from as many others as these stand for, each with its misfit
-    (the true value less the true reference) and its noise, all of them normal. Each property says from what
-    its interval comes.
+    The intervals hold for runs that are drawn from many others, each with its misfit (the true value less the
+    true reference) and its noise, all of them normal.
     """
 
     response: FloatArray
     reference: FloatArray
     value_variance: FloatArray
-    """Variance of each value by noise: that of one replicate over the replicates averaged."""
+    """Noise variance of each value: that of one replicate over the replicates averaged."""
     reference_variance: float
     """Variance of one reference value by noise."""
     settings: NDArray[np.int_]
@@ -66,37 +65,31 @@ class Agreement:
     def rmse(self) -> Estimate:
         """Root mean square of the differences, the noise of both included.
 
-        Over its expectation the sum of squares is chi-square with as many degrees of freedom as there are
-        runs: so the interval holds at the stated level where the misfits scatter about zero, and at least so
-        where they share a bias.
+        Over its expectation the sum of squares is chi-square with as many degrees of freedom as runs: the
+        interval holds its level where the misfits scatter about zero, and at least that where they share a
+        bias.
         """
         return self._misfit(0.0)
 
     @cached_property
     def rmse_without_own_noise(self) -> Estimate:
-        """Root mean square that the differences would have without the noise of the values.
-
-        As ``rmse_without_noise``, with the noise of the values alone taken out.
-        """
+        """Root mean square of the differences without the noise of the values (``rmse_without_noise``)."""
         return self._misfit(float(self.value_variance.mean()))
 
     @cached_property
     def rmse_without_noise(self) -> Estimate:
-        """Root mean square that the differences of these runs would have without the noise of either.
+        """Root mean square of the differences of these runs without the noise of either side.
 
-        The root of the mean square less the noise variances is too small: of a misfit as large as the noise
-        it reads .85 at 10 runs. The sum of squares over the noise variance is noncentral chi-square, and the
-        estimate is the misfit for which what was found is its median: as often above the truth as below. The
-        interval is that of ``rmse``, squared, less the noise variances; both are at least 0.
+        The root of the mean square less the noise variances is too small: .85 of a misfit as large as the
+        noise at 10 runs. The sum of squares over the noise variance is noncentral chi-square, and the
+        estimate is the misfit whose median it is. The interval is that of ``rmse``, squared, less the noise
+        variances; both are at least 0.
         """
         return self._misfit(float(self.value_variance.mean()) + self.reference_variance)
 
     @cached_property
     def bias(self) -> Estimate:
-        """Mean difference, values less reference; noise does not move it.
-
-        Student's interval, with the spread within the strata.
-        """
+        """Mean difference, values less reference, with Student's interval by the spread within the strata."""
         difference = self._difference
         value, count = float(difference.mean()), len(np.unique(self.strata))
         df = self.runs - count
@@ -112,21 +105,19 @@ class Agreement:
 
         The least-squares slope over the reliability of the reference, (s^2 - noise variance) / s^2 with s^2
         the variance of the reference (Fuller, Measurement Error Models, 1987, section 1.1): noise of the
-        reference flattens a plain slope, noise of the values does not. NaN where the reference varies no more
-        than its noise. The interval holds the slopes b for which the sum of products less b times the true
-        spread is no farther from zero than t of its standard error, whose square is the plain one's plus
-        2 (n - 1) (noise variance)^2 b^2; infinite where the data do not bound the slope. It holds at least at
-        the level with 3 or 4 runs, at it with more.
+        reference flattens a plain slope. NaN where the reference varies no more than its noise. The interval
+        holds the slopes b for which the sum of products less b times the true spread is within t standard
+        errors of zero, with the plain error's square plus 2 (n - 1) (noise variance)^2 b^2; infinite where
+        the data do not bound the slope.
         """
         return self._slope()
 
     @cached_property
     def spearman(self) -> Estimate:
-        """Rank correlation, as it stands.
+        """Rank correlation with noise.
 
-        The interval holds the rank correlations of normal pairs for which neither so high nor so low a one is
-        rarer than half of what the level leaves, from drawn pairs; a rank correlation of few runs takes few
-        values, so that it holds at least at the level there.
+        The interval holds the rank correlations of normal pairs for which neither such a high nor such a low
+        one is rarer than half of what the level leaves, from drawn pairs; with few runs it is conservative.
         """
         value = float(_spearman(self.response, self.reference))
         if not math.isfinite(value):
@@ -135,10 +126,10 @@ class Agreement:
 
     @cached_property
     def spearman_ceiling(self) -> Estimate:
-        """Rank correlation that a perfect model would show through the noise of both: mean and interval.
+        """Rank correlation of a perfect model through the noise of both sides: mean and interval.
 
-        The true values are the reference's means by setting, drawn together so that their spread is that of
-        the reference less its noise; noise of both sides is then added to them, again and again.
+        The true values are the reference's means by setting, shrunk so that their spread is that of the
+        reference less its noise; noise of both sides is then added to them repeatedly.
         """
         truth, rng = self._truth(), np.random.default_rng(SEED)
         shape = (DRAWS, self.runs)
@@ -160,7 +151,7 @@ class Agreement:
         return 0.5 * (1.0 - self.confidence)
 
     def _misfit(self, noise: float) -> Estimate:
-        """Return the root mean square difference with a noise variance taken out."""
+        """Return the root mean square difference without a noise variance."""
         total = float((self._difference**2).sum())
         low, high = total / stats.chi2.isf([self._tail, 1.0 - self._tail], self.runs) - noise
         value = _median_misfit(total, noise, self.runs)
@@ -211,16 +202,15 @@ def agreement(
     Parameters
     ----------
     values, reference : array-like, shape (runs,)
-        Series align by their labels, the others by their position; so do the arguments below.
+        Series are matched by their labels, others by position; so are the arguments below.
     value_variance : float or array-like, shape (runs,)
-        Noise variance of each value; of a mean of n replicates that of one, over n.
+        Noise variance of each value; for a mean of n replicates that of one, over n.
     reference_variance : float
         Noise variance of one reference value.
     settings : array-like, shape (runs,), optional
-        Labels: runs of one setting have one true value. By default every run has a setting of its own.
+        Labels: runs of one setting have one true value. Default: every run has a setting of its own.
     strata : array-like, shape (runs,), optional
-        Labels, such as the table that a run is from: the interval of the bias takes the spread within each.
-    confidence : float
+        Labels, such as the table of a run: the interval of the bias takes the spread within each.
 
     Raises
     ------
@@ -235,14 +225,14 @@ def agreement(
     first, second = real_array("values", values), real_array("reference", reference)
     if first.ndim != 1 or first.shape != second.shape or len(first) < 3:
         raise DesignError(
-            f"agreement needs values and reference of the same 3 or more runs, got shapes {first.shape} "
-            f"and {second.shape}"
+            f"values and reference must be of the same 3 or more runs, got shapes {first.shape} and "
+            f"{second.shape}"
         )
     if not (np.isfinite(first).all() and np.isfinite(second).all()):
-        raise DesignError("agreement needs finite values and reference: leave out the runs that lack one")
+        raise DesignError("values and reference must be finite: leave out the runs that lack one")
     own = real_array("value_variance", value_variance)
     if own.shape not in ((), (1,), first.shape):
-        raise DesignError(f"value_variance is one number or one a run, got shape {own.shape}")
+        raise DesignError(f"value_variance must be one number or one per run, got shape {own.shape}")
     variance = np.broadcast_to(own, first.shape)
     if not ((variance >= 0.0) & np.isfinite(variance)).all():
         raise DesignError(f"noise variances must be 0 or more, got {value_variance!r}")
@@ -263,7 +253,7 @@ def agreement(
 
 
 def _numbers(labels: ArrayLike, runs: int, name: str) -> NDArray[np.int_]:
-    """Return for every label the number of its kind."""
+    """Return the number of every label's kind."""
     given = np.asarray(labels, dtype=object)
     if given.shape != (runs,):
         raise DesignError(f"{name} must be a label for each of {runs} runs, got shape {given.shape}")
@@ -275,7 +265,7 @@ def _numbers(labels: ArrayLike, runs: int, name: str) -> NDArray[np.int_]:
 
 
 def _median_misfit(total: float, noise: float, runs: int) -> float:
-    """Return the root mean square misfit for which a sum of squares is the median of what would be found."""
+    """Return the root mean square misfit for which a sum of squares is the median."""
     if not noise > 0.0:
         return math.sqrt(total / runs)
     found = total / noise
@@ -288,13 +278,13 @@ def _median_misfit(total: float, noise: float, runs: int) -> float:
 
 
 def _rank_interval(value: float, runs: int, tail: float) -> tuple[float, float]:
-    """Return the population's rank correlations that do not contradict the one found in so many runs."""
+    """Return the rank correlations of populations that do not contradict the one found."""
     drawn = _rank_correlations(runs)
     rounding = 1e-9
     above = np.array([1.0 - np.searchsorted(row, value - rounding) / row.size for row in drawn])
     below = np.array([np.searchsorted(row, value + rounding, side="right") / row.size for row in drawn])
     ranks = 6.0 / math.pi * np.arcsin(0.5 * CORRELATIONS)
-    # Both rise or fall with the correlation but for the drawing; their ends are those of +-1.
+    # both are monotonic in the correlation but for the draws; their ends are those of +-1
     low = -1.0 if above[0] > tail else float(np.interp(tail, np.maximum.accumulate(above), ranks))
     high = 1.0 if below[-1] > tail else float(np.interp(-tail, np.maximum.accumulate(-below), ranks))
     return min(low, value), max(high, value)

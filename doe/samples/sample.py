@@ -40,7 +40,7 @@ class Sample:
             return values
         numbers = real_array("a sample", values)
         if numbers.ndim != 1 or numbers.size < 2:
-            raise DesignError(f"a sample is at least 2 values in one row, got shape {numbers.shape}")
+            raise DesignError(f"a sample must be at least 2 values in one row, got shape {numbers.shape}")
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
             raise DesignError(f"a sample's values must be finite: {numbers[bad[0]]} at position {bad[0] + 1}")

@@ -1,11 +1,11 @@
-"""Several differences at once, each of two errors (``doe.samples.two_errors``): the level of each, linear estimates.
+"""Several differences at once, each with two errors: the level of each, and intervals of linear estimates.
 
-The smallest p value of k differences lies below alpha / k with probability alpha at most (Bonferroni), less
-where the errors hang together, as those of responses of the same runs do, and less where the rule of a single
-difference keeps its level with some to spare. Here the level of each is the one at which all together hold
-theirs. It is found by drawing what would be found again if the estimated variances and correlations were the
-true ones (a bootstrap of the smallest p value; Beran, J. Amer. Statist. Assoc. 83, 1988, p. 687). The draws
-are the same each time, so that the same data give the same level.
+The smallest p value of k differences is below alpha / k with probability alpha at most (Bonferroni), less
+where the errors are correlated, as those of responses of the same runs are, and less where the rule of a
+single difference (``doe.samples.two_errors``) is conservative. Here the level of each is the one at which all
+together hold theirs. It is found by drawing with the estimated variances and correlations as the true ones (a
+bootstrap of the smallest p value; Beran, J. Amer. Statist. Assoc. 83, 1988, p. 687). The draws are fixed, so
+equal data give equal levels.
 """
 
 import bisect
@@ -23,36 +23,33 @@ from doe.samples.two_errors import TwoErrors, located
 FloatArray = NDArray[np.float64]
 
 DRAWS, SEED = 4096, 1
-"""Of the bootstrap: a level of .05 is known to .002."""
+"""Size and seed of the bootstrap: a level of .05 is known to .002."""
 
 LEVELS = 7
-"""Levels that the draws are looked at with, from `LOWEST` of the shared one to `HIGHEST` of the whole one."""
+"""Levels at which the draws are evaluated, from `LOWEST` of the shared one to `HIGHEST` of the whole one."""
 
 LOWEST, HIGHEST = 0.6, 1.2
 
 LEVEL_TAILS, INTERVAL_TAILS = (0.5, 0.4), (0.35, 0.12)
 """Probabilities of a smaller estimate for the true variances behind an interval: estimates that weigh as well
-as measure must be doubted more than those that only measure."""
+as measure are doubted more than those that only measure."""
 
 MANY = 1e6
-"""More degrees of freedom than these are as good as a known variance."""
+"""Degrees of freedom that count as a known variance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Simultaneous:
-    """Differences that are tested together: each has a first error, here or there another, and a second one.
+    """Differences that are tested together, each with a first error, possibly correlated, and a second one.
 
     Parameters
     ----------
     errors : sequence of TwoErrors
         Degrees of freedom of both errors of each difference.
-    second : array, shape (differences,)
-        Estimated variances of the second errors, which are independent.
-    correlation : array, shape (differences, differences)
-        Estimated correlation of the first errors, which is also that of what their variances come from.
+    second, correlation : array, shapes (differences,) and (differences, differences)
+        Estimated variances of the second errors, and correlation of the first.
     reference : array, shape (nodes, differences)
-        Estimated variances of the first errors where the level is found, small ones first; between them it is
-        interpolated.
+        Estimated variances of the first errors at which the level is found; it is interpolated between them.
     alpha : float
         Level of all tests together.
     """
@@ -71,21 +68,13 @@ class Simultaneous:
         return np.asarray(np.exp(np.interp(_size(first), size, level)))
 
     def accepted(self, difference: FloatArray, first: FloatArray) -> NDArray[np.bool_]:
-        """Return which differences are not significant, each at the level at which all hold theirs.
-
-        Parameters
-        ----------
-        difference, first : array, shape (points, differences)
-        """
+        """Return True for differences (points, tests) that are not significant at the common level."""
         return np.asarray(np.abs(difference) <= self.reach(first))
 
     def reach(self, first: FloatArray) -> FloatArray:
         """Return the size from which on each difference is significant, shape (points, differences).
 
-        Parameters
-        ----------
-        first : array, shape (points, differences)
-            Estimated variances of the first errors.
+        ``first`` holds the estimated variances of the first errors, same shape.
         """
         total = first + self.second
         grid, level = self._grid, self.levels(first)
@@ -104,16 +93,10 @@ class Simultaneous:
         """Return the half width of the interval of a linear combination of unknowns.
 
         The differences are slopes @ x plus their errors; x is estimated by least squares, each difference
-        weighed by its estimated variance. The interval holds direction @ x with probability 1 - alpha.
-
-        Parameters
-        ----------
-        slopes : array, shape (differences, unknowns)
-        direction : array, shape (unknowns,)
-            In the span of the rows of the slopes.
-        first : array, shape (differences,)
+        weighed by its estimated variance. The interval holds direction @ x with probability 1 - alpha, for a
+        direction (unknowns,) in the span of the rows of the slopes (differences, unknowns).
         """
-        # In coordinates of the slopes' span the normal equations have a solution, whatever the weights.
+        # in coordinates of the slopes' span the normal equations have a solution for all weights
         _, values, basis = np.linalg.svd(slopes, full_matrices=False)
         basis = basis[values > 1e-9 * values[0]]
         inner, wanted = slopes @ basis.T, basis @ direction
@@ -127,7 +110,7 @@ class Simultaneous:
 
     @property
     def _grid(self) -> FloatArray:
-        """Levels of one test at which the draws are looked at."""
+        """Levels of one test at which the draws are evaluated."""
         return np.geomspace(LOWEST * self.alpha / len(self.errors), HIGHEST * self.alpha, LEVELS)
 
     @cached_property
@@ -149,22 +132,22 @@ class Simultaneous:
                 found |= size[:, column] > table[place] + way[:, column] * np.diff(table)[place]
             return float(found.mean())
 
-        # The share of alarms grows with the level: the two of the grid around alpha are enough.
+        # the share of alarms grows with the level: the two of the grid around alpha are enough
         grid = self._grid
         place = min(max(bisect.bisect_left(grid, self.alpha, key=alarms), 1), len(grid) - 1)
         around = [np.log(max(alarms(level), 1e-12)) for level in grid[place - 1 : place + 1]]
         found = float(np.interp(np.log(self.alpha), around, np.log(grid[place - 1 : place + 1])))
         if any(rule.second_df < 2.0 for rule in self.errors):
-            # Two measurements tell too little of their spread to say what the rule has to spare.
+            # two measurements show too little of their spread for a higher level
             found = min(found, float(np.log(self.alpha / len(self.errors))))
         return found
 
     def _drawn(self, first: FloatArray, own_tail: float, other_tail: float) -> tuple[FloatArray, ...]:
         """Return drawn differences, the covariances of their first errors and the variances of the second.
 
-        Both as they would be estimated, shapes (draws, differences), (draws, differences, differences) and
-        (draws, differences). The true variances are those of which such an estimate as was found is smaller
-        with the probability of the tails.
+        Both are as they would be estimated, shapes (draws, differences), (draws, differences, differences)
+        and (draws, differences). The estimates found are smaller than those from the true variances with the
+        probability of the tails.
         """
         dfs = np.array(self._dfs)
         normal, spread, other, ratio = self._standard
@@ -187,7 +170,7 @@ class Simultaneous:
 
 
 def _size(first: FloatArray) -> FloatArray:
-    """Return the mean logarithm of variances, which tells apart where the level is found."""
+    """Return the mean logarithm of variances, at which the level is found."""
     return np.log(np.maximum(first, np.finfo(float).tiny)).mean(axis=-1)
 
 
@@ -206,11 +189,11 @@ def _variance(row: FloatArray, own: FloatArray, other: FloatArray) -> FloatArray
 
 @cache
 def _draws(first_df: tuple[float, ...], second_df: tuple[float, ...]) -> tuple[FloatArray, ...]:
-    """Return standard draws: first errors, the root of their Wishart matrix, second errors, chi-square / df.
+    """Return standard draws: first errors, root of their Wishart matrix, second errors, chi-square / df.
 
     The root is Bartlett's: lower triangular, the roots of chi-squares of falling degrees of freedom on the
     diagonal and normals below it; with fewer degrees of freedom than differences its last columns are empty.
-    The points are Sobol's, which know a level better than as many random ones.
+    The points are Sobol's, which determine a level better than as many random ones.
     """
     count = len(first_df)
     points = qmc.Sobol(3 * count + count * (count + 1) // 2, seed=SEED).random(DRAWS)

@@ -2,19 +2,17 @@
 
 D is normal with the variance v1 + v2, and s1^2, s2^2 estimate v1, v2 on their own degrees of freedom. Welch's
 approximation refers D / sqrt(s1^2 + s2^2) to Student's t (Biometrika 34, 1947, p. 28). With few degrees of
-freedom it finds differences too often: a level of .05 becomes .12 with 1 and 12. Banerjee's rule
-D^2 <= t1^2 s1^2 + t2^2 s2^2 holds for any ratio of the variances (Sankhya A 23, 1961, p. 359), with much to
-spare where both matter: .01 for .05. No rule that is continuous in the data holds its level exactly for all
-ratios (Linnik, Statistical Problems with Nuisance Parameters, 1968).
+freedom it finds differences too often: a level of .05 becomes .12 with 1 and 12. Banerjee's rule D^2 <= t1^2
+s1^2 + t2^2 s2^2 holds for any ratio of the variances (Sankhya A 23, 1961, p. 359), conservatively where both
+matter: .01 for .05. No rule that is continuous in the data holds its level exactly for all ratios (Linnik,
+Statistical Problems with Nuisance Parameters, 1968).
 
-The rule here is |D| <= ((t1 s1)^(1/q) + (t2 s2)^(1/q))^q with both t at the level k alpha: Banerjee's for
-q = 1/2 and k = 1, the larger of t1 s1 and t2 s2 for q = 0. The k nearest to 1 is taken with a q whose level
-strays from alpha by at most an eighth over all ratios of the variances; where there is none, what strays
-least and is nowhere above 1.15 alpha. The level is an integral over one beta variable, computed here by
-quadrature. With 7 degrees of freedom for the one error (a composite design of two factors) the coverage for
-.95 is .943 to .976 with 1 for the other, .945 to .957 with 2, .947 to .953 with 3 and more. With 1 it cannot
-be two-sided: of all rules whose half width falls in neither error, the best one, found by linear programming,
-still goes from .932 to .968. Where an error is zero, the other one alone counts: Student's t.
+The rule here is |D| <= ((t1 s1)^(1/q) + (t2 s2)^(1/q))^q with both t at the level k alpha: Banerjee's for q =
+1/2 and k = 1, the larger of t1 s1 and t2 s2 for q = 0. The k nearest to 1 is taken with a q whose level
+deviates from alpha by at most an eighth over all ratios of the variances; else the least deviation that is
+nowhere above 1.15 alpha. The level is an integral over one beta variable, computed here by quadrature. With 7
+degrees of freedom for the one error the coverage for .95 is .943 to .976 with 1 for the other, .945 to .957
+with 2, .947 to .953 with 3 and more. Where an error is zero, the other one alone counts: Student's t.
 """
 
 from dataclasses import dataclass
@@ -30,19 +28,19 @@ MOST = 1.15
 """Largest level over alpha: the coverage for .95 is nowhere below .9425."""
 
 STRAY = 0.125
-"""Share by which a level may stray from alpha without a search for better: .944 to .956 for .95."""
+"""Deviation of a level from alpha that ends the search: .944 to .956 for .95."""
 
 LEVELS = (1e-6, 1e-4, 1e-3, 0.003, 0.05 / 6, 0.0125, 0.05 / 3, 0.025, 0.05, 0.1, 0.2, 0.5, 1.0)
-"""Levels for which a rule is looked for, among them .05 shared by 1 to 6; interpolated in the log."""
+"""Levels for which a rule is searched, with .05 shared by 1 to 6; interpolated in the log."""
 
 SCALES, BENDS = (1.0, 0.95, 1.05, 0.9, 1.1, MOST), np.linspace(0.0, 0.5, 21)
-"""Values of k, the nearest to 1 first, and of q among which a rule is looked for."""
+"""Values of k, the nearest to 1 first, and of q among which a rule is searched."""
 
 MANY = 200.0
-"""More degrees of freedom than these change the rule no more."""
+"""Degrees of freedom above which the rule no longer changes."""
 
 RATIOS, NODES = 33, 64
-"""Ratios of the variances that are tried, and points of the quadrature."""
+"""Number of ratios of the variances that are tried, and of points of the quadrature."""
 
 CELLS = 512
 SHARES = np.sin(np.linspace(0.0, 0.5 * np.pi, CELLS + 1)) ** 2
@@ -51,13 +49,7 @@ SHARES = np.sin(np.linspace(0.0, 0.5 * np.pi, CELLS + 1)) ** 2
 
 @dataclass(frozen=True)
 class TwoErrors:
-    """Critical values and p values of a difference with two errors.
-
-    Parameters
-    ----------
-    first_df, second_df : float
-        Degrees of freedom of the two variances; infinite where one is known.
-    """
+    """Critical and p values of a difference, by the degrees of freedom of its errors (infinite: known)."""
 
     first_df: float
     second_df: float
@@ -65,11 +57,7 @@ class TwoErrors:
     def critical(self, share: ArrayLike, alpha: float) -> NDArray[np.float64]:
         """Return the size above which difference / error is significant at a two-sided level.
 
-        Parameters
-        ----------
-        share : array-like
-            s2^2 / (s1^2 + s2^2), the second error's share of the estimated variance.
-        alpha : float
+        ``share`` is s2^2 / (s1^2 + s2^2), the second error's share of the estimated variance.
         """
         return np.interp(np.asarray(share, np.float64), SHARES, self.table(checked_level(alpha)))
 
@@ -109,7 +97,7 @@ class TwoErrors:
 
 
 def located(share: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return where shares lie among `SHARES`: the place of the one below, and the way to the next."""
+    """Return the positions of shares among `SHARES`: the index below, and the fraction to the next."""
     place = np.arcsin(np.sqrt(share)) * (CELLS / (0.5 * np.pi))
     lower = np.clip(place.astype(np.intp), 0, CELLS - 1)
     return lower, place - lower
@@ -124,7 +112,7 @@ def _table(first_df: float, second_df: float, alpha: float) -> NDArray[np.float6
 def _half_width(
     first_df: float, second_df: float, share: NDArray[np.float64], alpha: float, scale: float, bend: float
 ) -> NDArray[np.float64]:
-    """Return how far the difference may lie from zero, over its error, by the rule of k and q."""
+    """Return the largest accepted difference over its error, by the rule of k and q."""
     shared = np.where((share > 0.0) & (share < 1.0), scale, 1.0) * alpha
     first, second = stats.t.isf(0.5 * shared, first_df), stats.t.isf(0.5 * shared, second_df)
     one, other = np.sqrt(1.0 - share) * first, np.sqrt(share) * second
@@ -149,7 +137,7 @@ def _best_rule(first_df: float, second_df: float, alpha: float) -> tuple[float, 
     """Return k and q (see the module), by bisection in q."""
     best, least = (1.0, 0.5), np.inf
     for scale in SCALES if alpha < 1.0 else ():
-        # A larger q widens the band: the best one strays as much upwards as downwards.
+        # a larger q widens the band: the best one deviates as much upwards as downwards
         low, high = 0, len(BENDS) - 1
         while low <= high:
             middle = (low + high) // 2

@@ -19,7 +19,7 @@ METHODS = ("welch", "pooled", "guarded", "one-sample")
 
 @dataclass(frozen=True)
 class Comparison:
-    """Difference of two means and what can be said of it; made by ``compare_means``."""
+    """Difference of two means with its tests; made by ``compare_means``."""
 
     a: Sample
     b: Sample | float
@@ -38,7 +38,7 @@ class Comparison:
 
     @property
     def p(self) -> float:
-        """Two-sided p value of no difference. A large one is no proof of equality: see ``equivalent``."""
+        """Two-sided p value of no difference. A large one does not show equality: see ``equivalent``."""
         return self._tails(self.t)
 
     @property
@@ -49,12 +49,12 @@ class Comparison:
 
     @property
     def different(self) -> bool:
-        """The difference is significant at alpha."""
+        """True if the difference is significant at alpha."""
         return self.p < self.alpha
 
     @property
     def equivalence_p(self) -> float | None:
-        """p value of the two one-sided tests (Schuirmann 1987) that the difference exceeds the margin."""
+        """P value of the two one-sided tests (Schuirmann 1987) that the difference exceeds the margin."""
         if self.margin is None:
             return None
         t = (self.margin - abs(self.difference)) / self.se
@@ -62,17 +62,17 @@ class Comparison:
 
     @property
     def equivalent(self) -> bool | None:
-        """The means are shown to differ by less than the margin, at alpha; None without a margin."""
+        """True if the means are shown to differ by less than the margin, at alpha; None without a margin."""
         return None if self.equivalence_p is None else self.equivalence_p < self.alpha
 
     @property
     def smallest_margin(self) -> float:
-        """Margin from which on these data show equivalence at alpha."""
+        """Smallest margin for which these data show equivalence at alpha."""
         return abs(self.difference) + self._critical(2.0 * self.alpha) * self.se
 
     @property
     def _guard(self) -> tuple[TwoErrors, float] | None:
-        """Rule of the guarded method and the second sample's share of the variance; None for the others."""
+        """Rule of the guarded method and the second sample's share of the variance; None for others."""
         if self.method != "guarded" or not isinstance(self.b, Sample):
             return None
         return TwoErrors(float(self.a.df), float(self.b.df)), (self.b.se / self.se) ** 2
@@ -106,20 +106,20 @@ def compare_means(
     a, b : values, or Sample(mean, sd, n)
         Two samples; with ``method="one-sample"`` b is a plain number.
     margin : float, optional
-        Difference that does not matter: asks for the equivalence test (TOST).
+        Difference that does not matter, for the equivalence test (TOST).
     method : {"welch", "pooled", "guarded", "one-sample"}
         Welch's t with two variances; Student's t with one variance for both, whose level is wrong where they
         differ (a test of equivalence at .05 may have .15 with 4 and 12 values); the rule of
-        ``doe.samples.two_errors``, whose level holds for few values too (at most .0575 for .05, where Welch's becomes
-        .12 with 2 and 12); a against the number b.
+        ``doe.samples.two_errors``, whose level holds for few values too (at most .0575 for .05, where Welch's
+        becomes .12 with 2 and 12); a against the number b.
     alpha : float
-        Level of the tests; 1 - alpha that of the interval. With a margin below .5.
+        Level of the tests; 1 - alpha is that of the interval. With a margin below .5.
 
     Raises
     ------
     DesignError
-        Fewer than two values, values that are not finite, no spread at all, a margin that is not positive, a
-        sample where a number is due or the other way round.
+        Fewer than two values, values that are not finite, no spread, a margin that is not positive, a sample
+        in place of a number or a number in place of a sample.
     """
     checked_choice("method", method, METHODS)
     if margin is not None:
@@ -127,7 +127,7 @@ def compare_means(
         if not margin > 0.0:
             raise DesignError(f"an equivalence margin must be positive, got {margin:g}")
     if checked_level(alpha) >= 0.5 and margin is not None:
-        raise DesignError(f"the level of a test of equivalence lies below 0.5: alpha is {alpha}")
+        raise DesignError(f"alpha of a test of equivalence must be below 0.5, got {alpha}")
     first = Sample.of(a)
     if method == "one-sample":
         if isinstance(b, Sample) or np.ndim(b) > 0:

@@ -30,10 +30,10 @@ from doe.design.polynomial_terms import (
     term_name,
 )
 from doe.errors import DesignError
-from doe.samples.lenth import LENTH_DRAWS, SEED, orthogonal_null, pseudo_error
+from doe.screen.two_level_effects import LENTH_DRAWS, SEED, orthogonal_null, pseudo_error
 
 ERRORS = ("pooled", "dummies", "pure", "lenth")
-"""Errors that effects can be tested against."""
+"""Errors against which effects can be tested."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class ScreenResult:
     error_rule: str
 
     def summary(self) -> str:
-        """Return effects, analysis of variance and what is significant as text."""
+        """Return effects, analysis of variance and significant factors as text."""
         facts = {
             "tested against": f"{self.error_rule}, {self.error_df:.3g} degrees of freedom",
             "significant at 0.05": ", ".join(self.significant(0.05)) or "none",
@@ -101,7 +101,7 @@ class ScreenResult:
 
     @cached_property
     def effects(self) -> pd.Series:
-        """Effects of every column, dummies too unless missing runs leave too few for them."""
+        """Effects of every column, with dummies unless missing runs leave too few for them."""
         return _all_effects(self.design, self.response)
 
     @cached_property
@@ -177,26 +177,24 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
     Parameters
     ----------
     design : Design
-        Two-level, with or without center runs, whose distance from the plane is a row ``curvature`` of the
-        analysis of variance; runs may be missing (``Design.select``): least squares then replaces the plain
+        Two-level design, with or without center runs, whose distance from the plane is a row ``curvature`` of
+        the analysis of variance. With missing runs (``Design.select``) least squares replaces the plain
         contrasts.
     response : array-like, shape (runs,) or (runs, replicates)
     error : {"dummies", "lenth", "pooled", "pure"}, optional
-        What the effects are tested against. ``"dummies"``: the columns without factor alone, which hold
-        interactions too; ``"lenth"``: Lenth's pseudo standard error (Technometrics 31, 1989, p. 469), for a
-        design without dummies in which few effects are active, with limits drawn from inert effects (Ye and
-        Hamada, Journal of Quality Technology 32, 2000, p. 57); ``"pooled"``: all that the factors leave
-        unexplained, dummies and replicates together; ``"pure"``: the replicates alone. By default the
-        dummies, where there are none Lenth's. Both stay at their level when two factors interact in 12 runs:
-        what the interaction adds to the factors' columns it adds to the dummies' too. (In 20 runs it falls by
-        60 % on one column, and .05 becomes .07.) Against the replicates it is found significant on whichever
-        column it falls: one strong interaction alarms in most screenings.
+        Error of the tests. ``"dummies"``: the columns without factor alone, which hold interactions too;
+        ``"lenth"``: Lenth's pseudo standard error (Technometrics 31, 1989, p. 469), for a design without
+        dummies in which few effects are active, with limits drawn from inert effects (Ye and Hamada, Journal
+        of Quality Technology 32, 2000, p. 57); ``"pooled"``: the whole residual, dummies and replicates
+        together; ``"pure"``: the replicates alone. Default: the dummies, without dummies Lenth's. Both keep
+        their level when two factors interact in 12 runs; against the replicates a strong interaction is found
+        significant on whichever column it falls.
 
     Raises
     ------
     DesignError
-        A response that is not finite or does not vary, terms that the runs cannot tell apart, or no degrees
-        of freedom for the error that was asked for.
+        A response that is not finite or does not vary, terms that the runs cannot distinguish, or no degrees
+        of freedom for the chosen error.
     """
     if error is not None:
         checked_choice("error", error, ERRORS)
@@ -205,7 +203,7 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
     blocks = None if design.blocks is None else design.blocks.loc[values.index]
     columns = model_matrix(coded, model_terms(design.names, "first-order"))
     center = (coded[design.names] == 0.0).all(axis=1)
-    if center.any() and not center.all():  # runs at the center show curvature, which is no error
+    if center.any() and not center.all():  # curvature at the center is not part of the error
         columns["curvature"] = center.to_numpy(dtype=float)
     fit = least_squares(pd.concat([columns, block_columns(blocks, columns.index)], axis=1), values)
     replicates = pure_error(coded, values, blocks)
@@ -215,7 +213,7 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
 
 
 def aliases(design: Design, interaction: str) -> pd.Series:
-    """Return how an interaction that is not fitted biases each column's coefficient.
+    """Return the bias of each column's coefficient by an interaction that is not fitted.
 
     The alias matrix (X'X)^-1 X'z of the product column z, for the intercept, every factor and every dummy:
     +1/3 means that a third of the interaction is added to that coefficient.
@@ -235,7 +233,7 @@ def _interactions(design: Design) -> list[Term]:
 def _error_term(
     design: Design, response: pd.Series, fit: RegressionResults, replicates: ErrorTerm, rule: str
 ) -> ErrorTerm:
-    """Return the error that a rule chooses; raise DesignError when it has no degrees of freedom."""
+    """Return the error of a rule; raise DesignError without degrees of freedom."""
     residual = ErrorTerm(float(fit.df_resid), float(fit.ssr))
     if rule == "lenth":
         return _lenth_error(_all_effects(design, response), len(response))
@@ -255,13 +253,13 @@ def _error_term(
 
 
 def _all_effects(design: Design, response: pd.Series) -> pd.Series:
-    """Return effects of factors and dummies; of the factors alone when too few runs are left for more."""
+    """Return effects of factors and dummies; of the factors alone with too few runs for more."""
     columns, solver = _effect_solver(design, response.index)
     return pd.Series(solver @ response.to_numpy(), index=columns)
 
 
 def _effect_solver(design: Design, runs: pd.Index) -> tuple[list[str], NDArray[np.float64]]:
-    """Return the columns whose effects can be told, and the matrix that makes them of the observations."""
+    """Return the columns with estimable effects, and the matrix from observations to effects."""
     coded = design.coded.loc[runs]
     blocks = None if design.blocks is None else design.blocks.loc[runs]
     base = np.column_stack([np.ones(len(coded)), block_columns(blocks, coded.index).to_numpy()])
@@ -274,9 +272,9 @@ def _effect_solver(design: Design, runs: pd.Index) -> tuple[list[str], NDArray[n
 
 
 def _lenth_error(effects: pd.Series, observation_count: int) -> ErrorTerm:
-    """Return Lenth's error: degrees of freedom m / 3; a mean square that gives effects their pseudo error."""
+    """Return Lenth's error: m / 3 degrees of freedom, and the mean square of its pseudo error."""
     error = float(pseudo_error(effects.to_numpy()[None, :])[0])
     if not error > 1e-12 * float(effects.abs().max()):
-        raise DesignError("Lenth's error needs effects that are not zero: more than half of them are")
+        raise DesignError("effects for Lenth's error must not be zero: more than half of them are")
     df = len(effects) / 3.0
     return ErrorTerm(df, df * error**2 * observation_count / 4.0)

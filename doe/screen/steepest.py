@@ -18,18 +18,17 @@ from doe.arguments import (
     checked_number,
     real_array,
 )
-from doe.design.design import Design, numbered, observations
+from doe.design.design import Design, coded_points, numbered, observations
 from doe.design.factors import Factor
-from doe.design.points import coded_points
 from doe.errors import DesignError
 from doe.response.response_surface import Surface
 from doe.screen.screened_effects import ScreenResult
 
 ROUNDING = 1e-12
-"""Slope relative to the largest coefficient below which it is a rounding error of the fit."""
+"""Slope relative to the largest coefficient that counts as a rounding error."""
 
 CLIMB_COLUMNS = {"response", "error", "error_percent"}
-"""Columns that the table of a climb adds to the factors'."""
+"""Columns of the table of a climb besides the factors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,37 +54,36 @@ def steepest_path(
     Parameters
     ----------
     fit : ScreenResult or Surface
-        Gives the direction by its gradient at the start, in coded units: a plane's is the same everywhere,
-        a quadratic's is not. Factors off the path are at their centers.
+        Model whose gradient at the start, in coded units, gives the direction. Factors off the path are at
+        their centers.
     steps : int
         Number of moves; the first run is the start itself. The path of a quadratic ends before the first run
-        at which the model predicts no further rise.
+        without a predicted rise.
     factors : names, optional
-        Factors that move; default all.
+        Factors that move. Default: all.
     step : float or mapping of positive natural steps by factor
-        A number: the textbook path, every factor moves in proportion to its component of the gradient, and
-        the strongest one by ``step`` coded units. A mapping: fixed natural steps; the model gives their signs
-        alone.
+        A number: every factor moves in proportion to its component of the gradient, and the strongest one by
+        ``step`` coded units. A mapping: fixed natural steps; the model gives their signs alone.
     start : mapping of natural values by factor, optional
         Default: the factors' centers.
     limits : mapping of (low, high) natural values by factor, optional
-        A factor that reaches its limit stays there while the others go on; the path ends where none moves.
+        A factor stops at its limit while the others go on; the path ends when all have stopped.
     descend : bool
         Go down instead of up.
 
     Raises
     ------
     DesignError
-        An unknown factor, a step that is not positive, a start outside its limits, no slope at all, or a
-        first step over the top of a quadratic.
+        An unknown factor, a step that is not positive, a start outside its limits, no slope, or a first step
+        over the top of a quadratic.
     """
     if not isinstance(fit, ScreenResult | Surface):
-        raise DesignError(f"a path starts from a ScreenResult or a Surface, got {fit!r}")
+        raise DesignError(f"fit must be a ScreenResult or a Surface, got {fit!r}")
     steps = checked_count("steps of a path", steps, most=MOST)
     chosen = fit.design.names if factors is None else checked_list("factors", factors)
     moving = [fit.design.factor(name) for name in chosen]
     if not moving:
-        raise DesignError("a path moves at least one factor, got none")
+        raise DesignError("factors must be one or more, got an empty list")
     names = [factor.name for factor in moving]
     start = {} if start is None else checked_map("start", start)
     limits = {} if limits is None else checked_map("limits", limits)
@@ -179,12 +177,12 @@ def _walk(
     pairs = [real_array(f"the limits of {name!r}", limits.get(name, (-np.inf, np.inf))) for name in names]
     for name, pair in zip(names, pairs, strict=True):
         if pair.shape != (2,):
-            raise DesignError(f"the limits of {name!r} are a low and a high value, got {limits[name]!r}")
+            raise DesignError(f"the limits of {name!r} must be a low and a high value, got {limits[name]!r}")
     low, high = np.array(pairs).T
     for name, value, bottom, top in zip(names, begin, low, high, strict=True):
         if not bottom <= value <= top:
             raise DesignError(
-                f"the start lies inside the limits: {name!r} is {value}, limits {bottom} to {top}"
+                f"the start must be inside the limits: {name!r} is {value}, limits {bottom} to {top}"
             )
     points = np.clip(begin + np.arange(steps + 1)[:, None] * stride, low, high)
     moved = np.r_[True, np.any(np.diff(points, axis=0) != 0.0, axis=1)]

@@ -1,4 +1,4 @@
-"""Aliases of a two-level design: which effects it cannot tell apart, its words and resolution."""
+"""Aliases of a two-level design: inseparable effects, words and resolution."""
 
 import itertools
 from collections.abc import Iterator
@@ -15,27 +15,27 @@ from doe.errors import DesignError
 
 ROMAN = {3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII"}
 LONGEST_WORD = 8
-"""Words are looked for up to this length; a resolution above it no longer matters to anybody."""
+"""Longest word that is searched; a resolution above it no longer matters."""
 
 SMALL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class AliasStructure:
-    """Effects that a two-level design mixes up; made by ``alias_structure``. Its text says it in words."""
+    """Effects that a two-level design mixes up; made by ``alias_structure``. Its text describes them."""
 
     matrix: pd.DataFrame
-    """Correlation of the columns of every two effects, from -1 to +1; +-1: they cannot be told apart."""
+    """Correlation of the columns of every two effects, from -1 to +1; +-1: inseparable."""
     word_length: float
-    """Length of the shortest word; infinite when there is none (a full factorial)."""
+    """Length of the shortest word; infinite without words (a full factorial)."""
     share: float
     """Largest share of an effect that such a word hides: 1 in a regular fraction."""
     words: tuple[str, ...]
-    """The words of that length that hide an effect wholly, signed: ``-A:B:C`` is constantly -1."""
+    """Words of that length that hide an effect wholly, signed: ``-A:B:C`` is constantly -1."""
 
     @property
     def resolution(self) -> float:
-        """Length of the shortest word, plus what a partial one leaves (Deng and Tang 1999)."""
+        """Length of the shortest word, plus the share that a partial one leaves (Deng and Tang 1999)."""
         return self.word_length + (1.0 - self.share) if np.isfinite(self.word_length) else np.inf
 
     @property
@@ -47,7 +47,7 @@ class AliasStructure:
         return roman if self.share > 1.0 - SMALL else f"{roman}, partly"
 
     def of(self, effect: str) -> pd.Series:
-        """Return what is mixed into an effect, with its share and sign, largest first."""
+        """Return the effects mixed into an effect, with share and sign, largest first."""
         if effect not in self.matrix.index:
             raise DesignError(f"no effect {effect!r} here; there are {', '.join(self.matrix.index)}")
         row = self.matrix.loc[effect].drop(effect)
@@ -55,7 +55,7 @@ class AliasStructure:
 
     @property
     def chains(self) -> list[str]:
-        """Groups of effects that cannot be told apart at all: ``A = B:C = -D:E``."""
+        """Groups of inseparable effects: ``A = B:C = -D:E``."""
         values, names, seen, chains = self.matrix.to_numpy(), list(self.matrix.index), set(), []
         for place, name in enumerate(names):
             if place in seen:
@@ -72,7 +72,7 @@ class AliasStructure:
         if self.words:
             lines.append(f"Words of the defining relation of that length: {', '.join(self.words)}.")
         chains = self.chains
-        lines += [f"Not told apart: {chain}." for chain in chains]
+        lines += [f"Inseparable: {chain}." for chain in chains]
         mains = [name for name in self.matrix.index if ":" not in name]
         pairs = [name for name in self.matrix.index if name.count(":") == 1]
         cross = self.matrix.loc[mains, pairs].abs().to_numpy() if pairs else np.zeros((1, 1))
@@ -89,17 +89,15 @@ class AliasStructure:
 
 
 def alias_structure(design: Design, order: int = 2) -> AliasStructure:
-    """Return which main effects and interactions a two-level design cannot tell apart.
+    """Return the main effects and interactions that a two-level design mixes up.
 
-    Works for regular fractions, where effects fall together wholly, and for others (Plackett-Burman), where
-    they do so partly. Runs at the center do not count.
+    It works for regular fractions, whose effects coincide wholly, and for others (Plackett-Burman), where
+    they coincide partly. Runs at the center do not count.
 
     Parameters
     ----------
-    design : Design
-        Two-level in every factor.
     order : int
-        Most factors of an interaction that is listed.
+        Largest number of factors of a listed interaction.
 
     Raises
     ------
@@ -123,7 +121,7 @@ def alias_structure(design: Design, order: int = 2) -> AliasStructure:
 
 
 def two_level_runs(design: Design) -> pd.DataFrame:
-    """Return the coded runs without those at the center; raise DesignError when a factor has other levels."""
+    """Return coded runs without those at the center; raise DesignError for a factor of other levels."""
     points = design.points
     coded = points[~(points == 0.0).all(axis=1)]
     for name in coded:
@@ -139,7 +137,7 @@ def two_level_runs(design: Design) -> pd.DataFrame:
 
 
 def shortest_words(coded: NDArray[np.float64], names: list[str]) -> tuple[float, float, tuple[str, ...]]:
-    """Return length and share of the shortest words of a two-level design, and the whole ones, signed."""
+    """Return length and share of the shortest words of a two-level design, and the whole ones."""
     for size in range(1, min(LONGEST_WORD, len(names)) + 1):
         shares = [(term, float(np.mean(product))) for term, product in _products(coded, names, size)]
         largest = max(abs(mean) for _, mean in shares)

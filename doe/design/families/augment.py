@@ -1,4 +1,4 @@
-"""Runs behind what has run: foldover, centers, axial points, joining; each addition is a block of its own."""
+"""Further runs for a design: foldover, centers, axial points, joining; each addition is a block."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,22 +18,25 @@ def join(*designs: Design, blocks: Sequence | None = None) -> Design:
     Parameters
     ----------
     designs : Design
-        Of the same factors in name, unit and order. Where the ranges differ, the first design's coding holds.
+        Designs with the same factors in name, unit and order. If the ranges differ, the first design's coding
+        holds.
     blocks : sequence, optional
-        A label for each design, whose runs become a block; default 1, 2, ... Designs with blocks of their own
-        keep those as ``label.block``.
+        A label for each design, whose runs become a block. Default: 1, 2, ... Designs with blocks of their
+        own keep those as ``label.block``.
     """
     for design in designs:
         checked_kind("design", design, Design)
     if len(designs) < 2:
-        raise DesignError(f"join takes two or more designs, got {len(designs)}")
+        raise DesignError(f"designs must be two or more, got {len(designs)}")
     first = designs[0]
     labels = list(range(1, len(designs) + 1)) if blocks is None else checked_list("blocks", blocks)
     if len(labels) != len(designs) or len(set(labels)) < len(labels):
-        raise DesignError(f"blocks: a different label for each of {len(designs)} designs, got {labels}")
+        raise DesignError(
+            f"blocks must be a different label for each of {len(designs)} designs, got {labels}"
+        )
     for design in designs[1:]:
         if design.names != first.names or [f.unit for f in design.factors] != [f.unit for f in first.factors]:
-            raise DesignError(f"designs of the same factors are joined: {first.names} and {design.names}")
+            raise DesignError(f"designs must have the same factors, got {first.names} and {design.names}")
     dummies = [name for name in first.dummies if all(name in design.dummies for design in designs)]
     tables: list[pd.DataFrame] = []
     blocked: list = []
@@ -49,16 +52,16 @@ def join(*designs: Design, blocks: Sequence | None = None) -> Design:
 def foldover(design: Design, factors: Sequence[str] | None = None) -> Design:
     """Return a two-level design with its mirror image as a second block.
 
-    With every factor turned round, main effects of the whole are clear of interactions of two factors; with
-    one factor alone, that factor and all its interactions are (Montgomery, Design and Analysis of
+    With every sign reversed, main effects of the whole are clear of interactions of two factors; with one
+    factor's sign reversed, that factor and all its interactions are (Montgomery, Design and Analysis of
     Experiments, section 8.6).
 
     Parameters
     ----------
     design : Design
-        In two levels; center runs stay what they are.
+        Two-level design; center runs stay as they are.
     factors : names, optional
-        Factors whose signs turn round; default all, and the dummies.
+        Factors whose signs are reversed. Default: all, and the dummies.
     """
     checked_kind("design", design, Design)
     turned = (
@@ -67,7 +70,7 @@ def foldover(design: Design, factors: Sequence[str] | None = None) -> Design:
         else [design.factor(name).name for name in checked_list("factors", factors)]
     )
     if not turned:
-        raise DesignError("a foldover turns the signs of at least one factor, got none")
+        raise DesignError("factors must be one or more, got an empty list")
     many = [f.name for f in design.factors if isinstance(f, Category) and len(f.levels) > 2]
     if many:
         raise DesignError(f"a category of more than two levels has no mirror image: {many[0]!r}")
@@ -77,10 +80,9 @@ def foldover(design: Design, factors: Sequence[str] | None = None) -> Design:
 
 
 def add_center(design: Design, count: int) -> Design:
-    """Return the design with center runs behind its own (in every block, where it has blocks).
+    """Return the design with center runs after its own (in every block, if it has blocks).
 
-    They cost little, show curvature (``screen`` and ``curvature_test``) and give an error without replicating
-    the rest.
+    They show curvature (``screen`` and ``curvature_test``) and give an error without replicates of the rest.
     """
     checked_kind("design", design, Design)
     numeric_factors(design.factors, "a center")
@@ -97,13 +99,12 @@ def add_center(design: Design, count: int) -> Design:
 
 
 def add_axial(design: Design, alpha: float, center: int = 0) -> Design:
-    """Return a two-level design that has run with axial points and centers behind it, as a second block.
+    """Return a two-level design that has run with axial points and centers as a second block.
 
-    So a factorial whose centers lie off the plane becomes a central composite design.
+    A factorial whose centers are off the plane becomes a central composite design.
 
     Parameters
     ----------
-    design : Design
     alpha : float
         Coded distance of the axial points, positive.
     center : int

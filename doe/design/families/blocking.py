@@ -1,4 +1,4 @@
-"""Blocks of a two-level design: the runs are split by interactions, so that main effects lose nothing."""
+"""Blocks of a two-level design: the runs are split by interactions, so that no main effect is lost."""
 
 import itertools
 import math
@@ -15,15 +15,13 @@ SMALL = 1e-9
 def block_labels(coded: NDArray[np.float64], blocks: int) -> NDArray[np.int64]:
     """Return the block of each run, 1 to ``blocks``, of a two-level design.
 
-    The signs of log2(blocks) interactions tell the blocks apart. They and their products (all of which are
-    lost) keep clear of main effects, and of interactions of two factors where that can be; among those the
-    longest, then the first in the order of the factors, are taken (Box, Hunter and Hunter, Statistics for
+    The signs of log2(blocks) interactions define the blocks. They and their products (all of which are lost)
+    are clear of main effects, and of interactions of two factors where possible; among those the longest,
+    then the first in the order of the factors, are taken (Box, Hunter and Hunter, Statistics for
     Experimenters, 2005, section 5.16).
 
-    Raises
-    ------
-    DesignError
-        A number of blocks that is no power of two, or one for which a main effect would be lost.
+    Raises DesignError: a number of blocks that is no power of two, or one for which a main effect would be
+    lost.
     """
     blocks = checked_count("blocks", blocks)
     if blocks == 1:
@@ -31,7 +29,7 @@ def block_labels(coded: NDArray[np.float64], blocks: int) -> NDArray[np.int64]:
     count = int(math.log2(blocks))
     if 2**count != blocks or blocks >= len(coded) or not (np.abs(coded) == 1.0).all():
         raise DesignError(
-            f"blocks of a two-level design: 2, 4, ... and fewer than its {len(coded)} runs, got {blocks}"
+            f"blocks of a two-level design must be 2, 4, ... and fewer than {len(coded)} runs, got {blocks}"
         )
     factor_count = coded.shape[1]
     words = [

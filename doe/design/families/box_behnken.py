@@ -3,10 +3,9 @@
 from collections.abc import Iterable
 
 import numpy as np
-import pandas as pd
 
 from doe.arguments import MOST, checked_count, checked_flag
-from doe.design.design import Design, numbered
+from doe.design.design import Design, design_of_blocks
 from doe.design.factors import Factor, numeric_factors
 from doe.design.families.factorial import basic_factorial
 from doe.errors import DesignError
@@ -18,9 +17,9 @@ TOGETHER: dict[int, tuple[tuple[tuple[int, ...], ...], ...]] = {
     6: (((1, 2, 4), (2, 3, 5), (3, 4, 6), (1, 4, 5), (2, 5, 6), (1, 3, 6)),),
     7: (((4, 5, 6), (1, 6, 7), (2, 5, 7), (1, 2, 4), (3, 4, 7), (1, 3, 5), (2, 3, 6)),),
 }
-"""Factors that move together while the others stay at their centers, by block (Box and Behnken,
-Technometrics 2, 1960, p. 455, table 4). With 6 and 7 factors the sign of the product of the three splits each
-group into two blocks."""
+"""Factors that move together while the others stay at their centers, by block (Box and Behnken, Technometrics
+2, 1960, p. 455, table 4). With 6 and 7 factors the sign of the product of the three splits each group into
+two blocks."""
 
 CENTERS = {3: 3, 4: 3, 5: 6, 6: 6, 7: 6}
 """Center runs of the published designs."""
@@ -31,20 +30,18 @@ def box_behnken(
 ) -> Design:
     """Return the Box-Behnken design of 3 to 7 factors: 12, 24, 40, 48 or 56 runs and the centers.
 
-    Own code: pyDOE3 1.6 takes every pair of factors, which with 6 and 7 factors gives 60 and 84 runs instead
-    of the published 48 and 56, and has no blocks. process-improve 2.2.0 has the published runs, but
-    splits 3 factors (and any others into any number) into blocks that are not orthogonal, without a word.
+    pyDOE3 1.6 has 60 and 84 runs with 6 and 7 factors instead of the published 48 and 56, and no blocks;
+    process-improve 2.2.0 makes blocks that are not orthogonal.
 
     Parameters
     ----------
-    factors : iterable of Factor
     center : int, optional
-        Center runs in all; default those of the published design (3, 3, 6, 6, 6).
+        Center runs in all. Default: those of the published design (3, 3, 6, 6, 6).
     blocks : bool
         Split the runs into the published orthogonal blocks: 3 with 4 factors, 2 with 5 to 7. Each gets the
         same number of center runs.
     seed : int, optional
-        Seed of the run order; None keeps the standard order.
+        Seed of the run order. Default: the standard order.
 
     Raises
     ------
@@ -54,7 +51,7 @@ def box_behnken(
     factors = numeric_factors(factors, "a Box-Behnken design")
     count = len(factors)
     if count not in TOGETHER:
-        raise DesignError(f"a Box-Behnken design takes 3 to 7 factors, got {count}")
+        raise DesignError(f"factors of a Box-Behnken design must be 3 to 7, got {count}")
     pieces = _pieces(count)
     if checked_flag("blocks", blocks) and len(pieces) == 1:
         raise DesignError("the Box-Behnken design of 3 factors has no orthogonal blocks")
@@ -62,14 +59,10 @@ def box_behnken(
         pieces = [np.vstack(pieces)]
     center = CENTERS[count] if center is None else checked_count("center", center, least=0, most=MOST)
     if center % len(pieces):
-        raise DesignError(
-            f"center is the number of center runs, shared by {len(pieces)} blocks, got {center}"
-        )
+        raise DesignError(f"center must be a multiple of the {len(pieces)} blocks, got {center}")
     each = np.zeros((center // len(pieces), count))
     pieces = [np.vstack([piece, each]) for piece in pieces]
-    coded = numbered(pd.DataFrame(np.vstack(pieces), columns=[factor.name for factor in factors]))
-    labels = np.repeat(range(1, len(pieces) + 1), [len(piece) for piece in pieces])
-    return Design(factors, coded, seed, blocks=pd.Series(labels, index=coded.index) if blocks else None)
+    return design_of_blocks(factors, pieces, seed)
 
 
 def _pieces(count: int) -> list[np.ndarray]:

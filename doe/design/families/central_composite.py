@@ -4,11 +4,10 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from doe.arguments import MOST, checked_count, checked_flag, checked_number
-from doe.design.design import Design, numbered
+from doe.design.design import Design, design_of_blocks
 from doe.design.factors import Factor, numeric_factors
 from doe.design.families.blocking import block_labels
 from doe.design.families.factorial import basic_factorial
@@ -42,28 +41,25 @@ def central_composite(
 
     Standard order: the two-level part (first factor fastest; all corners up to 4 factors, else a fraction of
     resolution V, so that 5 factors take 16 corners), the axial points -alpha and +alpha of each factor, the
-    center runs. With blocks, each block's center runs stand behind it.
-
-    Own code: pyDOE3 1.6.2 has all corners always (50 runs with 5 factors, where 32 do), and no blocks.
+    center runs. With blocks, each block's center runs follow its other runs. pyDOE3 1.6.2 has no fractions
+    and no blocks.
 
     Parameters
     ----------
-    factors : iterable of Factor
     alpha : {"rotatable", "face", "spherical", "orthogonal", "blocks"} or float
         Coded distance of the axial points. ``"rotatable"``: fourth root of the number of two-level runs, so
         that the variance of a prediction depends on the distance from the center alone; ``"face"``: 1;
         ``"spherical"``: square root of the number of factors; ``"orthogonal"``: the squares' coefficients are
         uncorrelated with one another (Myers, Montgomery and Anderson-Cook, Response Surface Methodology,
         section 8.1); ``"blocks"``: the axial block is orthogonal to the others, so that blocks and model do
-        not disturb each other (Box and Hunter, Ann. Math. Stat. 28, 1957, p. 232; R's rsm calls this one
-        orthogonal).
+        not disturb each other (Box and Hunter, Ann. Math. Stat. 28, 1957, p. 232; orthogonal in R's rsm).
     center : int or (int, int)
         Center runs; two numbers: in each block of corners, and in the axial block. One number with blocks is
         that of every block.
     seed : int, optional
-        Seed of the run order; None keeps the standard order.
+        Seed of the run order. Default: the standard order.
     blocks : int
-        1: none; 2: corners, then axial points; 3 or 5: the corners in two or four blocks, then the axial
+        1: no blocks; 2: corners, then axial points; 3 or 5: the corners in two or four blocks, then the axial
         points.
     full : bool
         Take all corners from 5 factors on too.
@@ -71,8 +67,8 @@ def central_composite(
     Raises
     ------
     DesignError
-        More than 10 factors, a category, an unknown alpha or one that is not positive, a negative number of
-        center runs, blocks that would cost a main effect.
+        More than 10 factors, a category, an unknown or not positive alpha, a negative number of center runs,
+        blocks that would cost a main effect.
     """
     factors = numeric_factors(factors, "a central composite design")
     blocks = checked_count("blocks", blocks)
@@ -83,18 +79,14 @@ def central_composite(
     axial = np.kron(np.eye(len(factors)), [[-distance], [distance]])
     centers = np.zeros((max(cube, star), len(factors)))
     pieces = [np.vstack([part, centers[:cube]]) for part in parts] + [np.vstack([axial, centers[:star]])]
-    coded = numbered(pd.DataFrame(np.vstack(pieces), columns=[factor.name for factor in factors]))
-    if blocks == 1:
-        return Design(factors, coded, seed)
-    labels = np.repeat(range(1, len(pieces) + 1), [len(piece) for piece in pieces])
-    return Design(factors, coded, seed, blocks=pd.Series(labels, index=coded.index))
+    return design_of_blocks(factors, pieces if blocks > 1 else [np.vstack(pieces)], seed)
 
 
 def two_level_part(factor_count: int, full: bool = False) -> NDArray[np.float64]:
     """Return the -1 / +1 runs: all corners up to 4 factors, else a fraction of resolution V or more."""
     if factor_count > max(FRACTIONS):
         raise DesignError(
-            f"a central composite design takes 1 to {max(FRACTIONS)} factors, got {factor_count}"
+            f"factors of a central composite design must be 1 to {max(FRACTIONS)}, got {factor_count}"
         )
     further = () if full else FRACTIONS.get(factor_count, ())
     basic = basic_factorial(factor_count - len(further))
@@ -103,7 +95,7 @@ def two_level_part(factor_count: int, full: bool = False) -> NDArray[np.float64]
 
 def _corner_blocks(corners: NDArray[np.float64], blocks: int) -> list[NDArray[np.float64]]:
     if blocks not in (1, 2, 3, 5):
-        raise DesignError(f"a central composite design has 1, 2, 3 or 5 blocks, got {blocks}")
+        raise DesignError(f"blocks of a central composite design must be 1, 2, 3 or 5, got {blocks}")
     labels = block_labels(corners, max(blocks - 1, 1))
     return [corners[labels == label] for label in range(1, int(labels.max()) + 1)]
 
@@ -114,7 +106,7 @@ def _centers(center: int | tuple[int, int], blocks: int) -> tuple[int, int]:
         count = checked_count("center", center, least=0, most=MOST)
         return (count if blocks > 1 else 0), count
     if len(center) != 2:
-        raise DesignError(f"center is one or two numbers of center runs, got {center}")
+        raise DesignError(f"center must be one or two numbers of center runs, got {center}")
     cube, star = (checked_count("center", count, least=0, most=MOST) for count in center)
     return cube, star
 
@@ -135,6 +127,6 @@ def _axial_distance(
     }
     if isinstance(alpha, str):
         if alpha not in named:
-            raise DesignError(f"alpha is one of {', '.join(ALPHAS)} or a number, got {alpha!r}")
+            raise DesignError(f"alpha must be one of {', '.join(ALPHAS)} or a number, got {alpha!r}")
         return named[alpha]
     return checked_number("alpha", alpha, above=0.0)

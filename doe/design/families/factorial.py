@@ -5,11 +5,10 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from doe.arguments import MOST, checked_count, checked_list
-from doe.design.design import Design, numbered
+from doe.design.design import Design, design_of_blocks
 from doe.design.factors import Category, Factor, checked_factors, two_level_factors
 from doe.design.families.aliases import alias_structure
 from doe.design.families.blocking import block_labels
@@ -57,21 +56,20 @@ def full_factorial(
     ----------
     factors : iterable of Factor
         Numbers or categories (all of whose levels are used).
-    levels : int or one a factor
-        Equally spaced levels of the numbers, -1 and +1 among them.
+    levels : int or one per factor
+        Equally spaced levels of the numbers, with -1 and +1.
     blocks : int
-        Blocks of equal size, for two-level designs: 2, 4, ...; what is lost to them are the interactions of
-        most factors.
+        Blocks of equal size, for two-level designs: 2, 4, ...; they cost the interactions of most factors.
     center : int
         Runs at the center, in every block (numbers only).
     seed : int, optional
-        Seed of the run order; None keeps the standard order.
+        Seed of the run order. Default: the standard order.
     """
     factors = checked_factors(factors)
     given = [levels] * len(factors) if isinstance(levels, int) else checked_list("levels", levels)
     counts = [checked_count("levels", count, least=2, most=MOST) for count in given]
     if len(counts) != len(factors):
-        raise DesignError(f"levels: two or more for each of {len(factors)} factors, got {levels}")
+        raise DesignError(f"levels must be two or more for each of {len(factors)} factors, got {levels}")
     grids = [
         np.array(factor.codes) if isinstance(factor, Category) else np.linspace(-1.0, 1.0, count)
         for factor, count in zip(factors, counts, strict=True)
@@ -95,27 +93,27 @@ def fractional_factorial(
 ) -> Design:
     """Return a regular fraction of a two-level factorial design.
 
-    Its ``notes`` give the generators and the resolution; ``alias_structure`` says what it mixes up. Own code:
-    pyDOE3 1.6 builds fractions from words that the user must know, and has no table of the best ones.
+    Its ``notes`` give the generators and the resolution; ``alias_structure`` describes its aliases. pyDOE3
+    1.6 has no table of the best fractions.
 
     Parameters
     ----------
     factors : iterable of Factor
         Numbers, or categories of two levels.
     runs : int, optional
-        A power of two; default the fewest of the resolution asked for.
+        A power of two. Default: the smallest of the requested resolution.
     resolution : int, optional
-        Least resolution; default 4 without ``runs``.
+        Least resolution. Default: 4 without ``runs``.
     generators : sequence of str, optional
-        The further factors as products of the earlier ones, with a sign: ``["D = A:B:C", "E = -A:B"]``.
+        Further factors as products of the earlier ones, with a sign: ``["D = A:B:C", "E = -A:B"]``.
     blocks, center, seed
         As in ``full_factorial``.
 
     Raises
     ------
     DesignError
-        No fraction of that size or resolution in the catalogue, a generator that is not understood, or a
-        number of blocks that would cost a main effect.
+        No fraction of that size or resolution in the catalogue, an invalid generator, or a number of blocks
+        that would cost a main effect.
     """
     factors = two_level_factors(factors, "a two-level fraction")
     names = [factor.name for factor in factors]
@@ -139,7 +137,7 @@ def fractional_factorial(
 
 
 def basic_factorial(count: int) -> NDArray[np.float64]:
-    """Return all corners of ``count`` two-level factors, shape (2^count, count), the first one fastest."""
+    """Return all corners of two-level factors, shape (2^count, count), the first one fastest."""
     return np.array(list(itertools.product([-1.0, 1.0], repeat=count)))[:, ::-1]
 
 
@@ -198,14 +196,14 @@ def _generated(names: list[str], generators: Sequence[str]) -> tuple[NDArray[np.
     further: dict[str, NDArray[np.float64]] = {}
     for text in generators:
         if not isinstance(text, str):
-            raise DesignError(f"a generator is text such as 'D = A:B:C', got {text!r}")
+            raise DesignError(f"a generator must be text such as 'D = A:B:C', got {text!r}")
         name, equal, word = (part.strip() for part in text.partition("="))
         parts = [part.strip() for part in word.lstrip("+-").split(":")]
-        strangers = [part for part in parts if part not in basic_names]
-        if not equal or name not in names[len(basic_names) :] or strangers or name in further:
+        unknown = [part for part in parts if part not in basic_names]
+        if not equal or name not in names[len(basic_names) :] or unknown or name in further:
             raise DesignError(
-                f"a generator gives one of {', '.join(names[len(basic_names) :])} as a product of "
-                f"{', '.join(basic_names)}, such as {names[-1]!r} = {':'.join(basic_names[:2])!r}; "
+                f"a generator must give one of {', '.join(names[len(basic_names) :])} as a product of "
+                f"{', '.join(basic_names)}, such as {names[-1]!r} = {':'.join(basic_names[:2])!r}, "
                 f"got {text!r}"
             )
         sign = -1.0 if word.startswith("-") else 1.0
@@ -217,7 +215,7 @@ def _generated(names: list[str], generators: Sequence[str]) -> tuple[NDArray[np.
 def _with_blocks(
     factors: tuple[Factor, ...], coded: NDArray[np.float64], blocks: int, center: int, seed: int | None
 ) -> Design:
-    """Return the design of these runs, in blocks each of which has its center runs behind it."""
+    """Return the design of these runs, in blocks, each with its center runs."""
     center, blocks = checked_count("center", center, least=0, most=MOST), checked_count("blocks", blocks)
     if center and any(isinstance(factor, Category) for factor in factors):
         raise DesignError("a category has no center: choose center=0")
@@ -227,11 +225,4 @@ def _with_blocks(
         np.vstack([coded[order][labels[order] == label], np.zeros((center, coded.shape[1]))])
         for label in range(1, blocks + 1)
     ]
-    names = [factor.name for factor in factors]
-    table = numbered(pd.DataFrame(np.vstack(parts), columns=names))
-    if blocks == 1:
-        return Design(factors, table, seed)
-    sizes = [len(part) for part in parts]
-    return Design(
-        factors, table, seed, blocks=pd.Series(np.repeat(range(1, blocks + 1), sizes), index=table.index)
-    )
+    return design_of_blocks(factors, parts, seed)

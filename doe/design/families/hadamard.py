@@ -30,21 +30,15 @@ BLOCKS_28 = (
     "+++---++-+--+----+++-++--++",
     "+++----++-+--+-+---++-+++-+",
 )
-"""First nine rows of the design in 28 runs, same place; its three blocks of columns then move on in turn."""
+"""First nine rows of the design in 28 runs, same source; its three blocks of columns are rotated in turn."""
 
 
 def screening_matrix(runs: int, factor_count: int | None = None) -> Matrix:
     """Return the N x (N - 1) matrix of -1 and +1 with orthogonal, balanced columns and a last row of -1.
 
-    The published tables where there is one. Else the Hadamard matrix, among those constructed here, in which
-    the interactions of the first columns fall least onto one another (``worst_alias``), its columns in the
-    order that keeps them apart longest.
-
-    Parameters
-    ----------
-    runs : int
-    factor_count : int, optional
-        How many columns are factors; default all.
+    It is the published table if there is one; else the Hadamard matrix, among those constructed here, in
+    which the interactions of the first ``factor_count`` columns (default: all) coincide least
+    (``worst_alias``).
     """
     if runs in GENERATORS:
         first = _signs(GENERATORS[runs])
@@ -76,20 +70,19 @@ def worst_alias(columns: Matrix) -> float:
 
 
 def constructible(runs: int) -> bool:
-    """Return whether ``screening_matrix`` has this size."""
+    """Return True if ``screening_matrix`` has this size."""
     return runs in GENERATORS or runs == 28 or bool(hadamard_candidates(runs))
 
 
 def hadamard_candidates(order: int) -> list[Matrix]:
-    """Return Hadamard matrices of an order (H'H = order I), as many as are constructed here.
+    """Return the Hadamard matrices of an order (H'H = order I) that can be constructed here.
 
-    The two constructions from the squares of a finite field of q elements, with q a prime or the square of
-    one (Paley, J. Math. Phys. 12, 1933), in orders q + 1 and 2 (q + 1), and doubling of the matrix of half
-    the order (Sylvester 1867). The first column is that of the intercept. A doubled matrix and Paley's
-    second have two halves of columns that differ in sign in half of the runs. Interactions within the second
-    half fall
-    onto the first, so that it comes first, and the column that tells the halves apart comes last: it holds
-    n/2 - 1 interactions wholly or nearly so.
+    They are the two constructions from the squares of a finite field of q elements, with q a prime or the
+    square of one (Paley, J. Math. Phys. 12, 1933), in orders q + 1 and 2 (q + 1), and doubling of the matrix
+    of half the order (Sylvester 1867). The first column is that of the intercept. A doubled matrix and
+    Paley's second have two halves of columns that differ in sign in half of the runs. Interactions within the
+    second half coincide with the first, so it comes first, and the column that distinguishes the halves comes
+    last: it holds n/2 - 1 interactions wholly or nearly so.
     """
     if order in (1, 2):
         return [np.array([[1.0, 1.0], [1.0, -1.0]])[:order, :order]]
@@ -119,13 +112,10 @@ def hadamard_candidates(order: int) -> list[Matrix]:
 def conference_matrix(order: int) -> Matrix:
     """Return C with a zero diagonal, -1 and +1 elsewhere, and C'C = (order - 1) I.
 
-    From the squares of a finite field (Paley 1933; Goethals and Seidel, Canad. J. Math. 19, 1967), or, where
-    q = order - 1 is no prime or square of one, by doubling of a skew one: [[S, S + I], [S - I, -S]].
+    It comes from the squares of a finite field (Paley 1933; Goethals and Seidel, Canad. J. Math. 19, 1967),
+    or, where q = order - 1 is no prime or square of one, from doubling a skew one: [[S, S + I], [S - I, -S]].
 
-    Raises
-    ------
-    DesignError
-        No construction is known here (orders 22 and 34 have none at all).
+    Raises DesignError: no construction is known here (orders 22 and 34 have no such matrix).
     """
     if order % 2 == 0 and order > 2 and is_field(order - 1):
         matrix = np.ones((order, order))
@@ -140,20 +130,20 @@ def conference_matrix(order: int) -> Matrix:
 
 
 def has_conference(order: int) -> bool:
-    """Return whether ``conference_matrix`` has this order."""
+    """Return True if ``conference_matrix`` has this order."""
     if order % 2 or order < 4:
         return False
     return is_field(order - 1) or (order % 8 == 0 and has_conference(order // 2))
 
 
 def is_field(size: int) -> bool:
-    """Return whether the size is an odd prime or the square of one."""
+    """Return True if the size is an odd prime or the square of one."""
     root = math.isqrt(size)
     return size % 2 == 1 and (_is_prime(size) or (_is_prime(root) and root**2 == size))
 
 
 def residue_matrix(size: int) -> Matrix:
-    """Return Q with Q[i, j] = +1, -1 or 0 as element i - j of the field is a square, none, or zero."""
+    """Return Q with Q[i, j] = +1 if i - j is a square of the field, 0 if it is zero, else -1."""
     if _is_prime(size):
         squares = _square_character(size)
         index = np.arange(size)
@@ -168,10 +158,10 @@ def residue_matrix(size: int) -> Matrix:
 
 
 def _orders(matrix: Matrix) -> list[Matrix]:
-    """Return a matrix of two halves, the second's columns first and the one that tells them apart last.
+    """Return a matrix of two halves, the second's columns first and the one that distinguishes them last.
 
-    Once so, and once with the last column of either half behind the others too: a half that was doubled
-    itself has there the column that told its own halves apart.
+    The second order also moves the last column of either half back: in a half that was doubled itself it
+    distinguished that one's halves.
     """
     half = len(matrix) // 2
     plain = [0, *range(half + 1, 2 * half), *range(1, half), half]

@@ -25,7 +25,7 @@ from doe.errors import DesignError
 TOLERANCE = 1e-9
 
 MOST_TRIED = 10_000_000
-"""Combinations of shares that are looked through."""
+"""Largest number of combinations of shares that are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +34,10 @@ class Mixture:
 
     Parameters
     ----------
-    shares : DataFrame, one row a blend
+    shares : DataFrame, one row per blend
         Share of each component; every row adds up to 1.
     lower : mapping of float by component
-        Least shares, to which the design is scaled (pseudo-components); what is not named has 0.
+        Least shares, to which the design is scaled (pseudo-components). Default: 0.
     seed : int, optional
         Seed of ``run_order``.
     """
@@ -53,13 +53,13 @@ class Mixture:
         for name in self.shares.columns:
             real_array(f"the shares of {name!r}", self.shares[name])
         if self.shares.empty:
-            raise DesignError("a mixture has at least one blend, got an empty table")
+            raise DesignError("a mixture must have at least one blend, got an empty table")
         totals = self.shares.sum(axis=1)
         off = totals.index[~((totals - 1.0).abs() <= TOLERANCE)]
         if len(off) or not (self.shares >= -TOLERANCE).all(axis=None):
             place = off[0] if len(off) else self.shares.index[(self.shares < -TOLERANCE).any(axis=1)][0]
             raise DesignError(
-                f"shares are not negative and add up to 1; blend {place} adds up to {totals[place]}"
+                f"shares must not be negative and add up to 1; blend {place} adds up to {totals[place]}"
             )
 
     @property
@@ -90,12 +90,11 @@ def simplex_lattice(
 
     Parameters
     ----------
-    components : sequence of str
     degree : int
         m, 1 or more; the lattice of q components has C(q + m - 1, m) blends.
     interior : bool
-        Add the blend of equal shares and those half way to the pure components, which a lattice of low degree
-        lacks and which show whether the model holds inside.
+        Add the blend of equal shares and those half way to the pure components, which show if the model holds
+        inside.
     lower : mapping of float by component, optional
         Least shares.
     seed : int, optional
@@ -133,9 +132,9 @@ def _checked(components: Sequence[str]) -> list[str]:
     names = checked_list("components", components)
     for name in names:
         if not isinstance(name, str):
-            raise DesignError(f"a component's name is text, got {name!r}")
+            raise DesignError(f"a component's name must be text, got {name!r}")
     if len(names) < 2 or len(set(names)) < len(names):
-        raise DesignError(f"a mixture has two or more different components, got {components!r}")
+        raise DesignError(f"components must be two or more, all different, got {components!r}")
     return names
 
 
@@ -143,13 +142,13 @@ def _scaled(
     names: list[str], shares: np.ndarray, lower: Mapping[str, float] | None, seed: int | None
 ) -> Mixture:
     lower = {} if lower is None else checked_map("lower", lower)
-    strangers = [name for name in lower if name not in names]
-    if strangers:
-        raise DesignError(f"lower names {strangers[0]!r}, which is no component of {', '.join(names)}")
+    unknown = [name for name in lower if name not in names]
+    if unknown:
+        raise DesignError(f"lower names {unknown[0]!r}, which is no component of {', '.join(names)}")
     least = np.array(
         [checked_number(f"the least share of {name!r}", lower.get(name, 0.0), least=0.0) for name in names]
     )
     if not least.sum() < 1.0:
-        raise DesignError(f"least shares are not negative and add up to less than 1, got {lower}")
+        raise DesignError(f"least shares must not be negative and add up to less than 1, got {lower}")
     table = pd.DataFrame(least + (1.0 - least.sum()) * shares, columns=names)
     return Mixture(numbered(table), lower, seed)

@@ -1,4 +1,4 @@
-"""Columns of a polynomial model of numbers and categories, for designs that are not fitted yet."""
+"""Columns of a polynomial model of numbers and categories, for designs before their fit."""
 
 import itertools
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Optimal designs: the runs, among those allowed, that tell a model's coefficients or predictions best."""
+"""Optimal designs: the allowed runs that determine a model's coefficients or predictions best."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -10,15 +10,14 @@ from scipy.stats import qmc
 
 from doe.arguments import MOST, checked_choice, checked_count, checked_kind, checked_list, checked_seed
 from doe.design.anova import block_columns
-from doe.design.design import Design, numbered
+from doe.design.design import Design, natural_points, numbered
 from doe.design.factors import Category, Factor, checked_factors
 from doe.design.families.augment import join
 from doe.design.families.model_columns import model_columns
-from doe.design.points import natural_points
 from doe.errors import DesignError
 
 CANDIDATE_BUDGET = 4_096
-"""Most candidate runs; a grid that has more is replaced by Sobol points and the corners."""
+"""Largest number of candidate runs; a larger grid is replaced by Sobol points and the corners."""
 
 MOST_PASSES = 100
 
@@ -39,16 +38,14 @@ def optimal_design(
 ) -> Design:
     """Return an optimal design, by exchange of candidate runs (Fedorov 1972) from several random starts.
 
-    Own code: scipy has none, and pyDOE3 1.6 neither.
-
     Parameters
     ----------
     factors : iterable of Factor
         Numbers and categories of any number of levels.
     runs : int
-        New runs.
+        Number of new runs.
     model : {"first-order", "interaction", "quadratic", "three-factor"}
-        The polynomial that will be fitted; a category has no square.
+        Polynomial of the later fit; a category has no square.
     criterion : {"D", "I"}
         ``"D"``: largest determinant of X'X, for the coefficients; ``"I"``: smallest variance of a prediction,
         averaged over the allowed part of the box.
@@ -56,18 +53,17 @@ def optimal_design(
         Rules for the natural values: ``"v0 < v1 < v2"``, or a function of the table that returns True where
         a row is allowed.
     existing : Design, optional
-        Runs that are there already, of the same factors: they stay, come first, and are a block of their own,
-        which the criterion counts as a term.
+        Existing runs of the same factors: they come first, as a block of their own, which the criterion
+        counts as a term.
     levels : int, optional
-        Levels of a number among the candidates; default 5, or 3 where there are many factors.
+        Levels of a number among the candidates. Default: 5, or 3 with many factors.
     starts : int
         Random starts; the best one is returned.
-    seed : int
 
     Raises
     ------
     DesignError
-        An unknown criterion, constraints that allow no run or too few for the model.
+        An unknown criterion, or constraints that allow no run or too few for the model.
     """
     factors = checked_factors(factors)
     checked_choice("criterion", criterion, ("D", "I"))
@@ -89,12 +85,12 @@ def optimal_design(
         raise DesignError(f"{count} coefficients need as many runs, got {len(kept) + runs}")
     if np.linalg.matrix_rank(np.vstack([expanded, kept])) < count:
         raise DesignError(
-            f"the {len(candidates)} runs that the constraints allow cannot tell {count} coefficients "
-            "apart: give more levels, a simpler model or looser constraints"
+            f"the {len(candidates)} runs that the constraints allow cannot distinguish {count} coefficients: "
+            "give more levels, a simpler model or looser constraints"
         )
     moments = None
     if criterion == "I":
-        moments = np.zeros((count, count))  # the blocks' columns are no part of a prediction
+        moments = np.zeros((count, count))  # predictions do not use the blocks' columns
         moments[:polynomial, :polynomial] = _moments(factors, model, constraints, seed)
     found = (_exchanged(expanded, kept, _start(expanded, kept, runs, rng), moments) for _ in range(starts))
     _, rows = min(found, key=lambda pair: pair[0])
@@ -105,19 +101,19 @@ def optimal_design(
 def allowed(
     factors: Sequence[Factor], coded: pd.DataFrame, constraints: Sequence[Constraint]
 ) -> pd.DataFrame:
-    """Return the coded points whose natural values keep all constraints; raise DesignError when none does."""
+    """Return coded points whose natural values keep all constraints; raise DesignError without any."""
     natural = natural_points(factors, coded)
     mask = np.ones(len(coded), dtype=bool)
     for rule in checked_list("constraints", constraints):
         if not isinstance(rule, str) and not callable(rule):
-            raise DesignError(f"a constraint is text such as 'v0 < v1' or a function, got {rule!r}")
+            raise DesignError(f"a constraint must be text such as 'v0 < v1' or a function, got {rule!r}")
         try:
             held = natural.eval(rule, engine="python") if isinstance(rule, str) else rule(natural)
         except Exception as error:
             raise DesignError(f"constraint {rule!r} cannot be evaluated: {error}") from error
         held = np.asarray(held)
         if held.shape != (len(coded),) or held.dtype != np.bool_:
-            raise DesignError(f"constraint {rule!r} gives True or False for every run: {held.dtype}")
+            raise DesignError(f"constraint {rule!r} must give True or False for every run, got {held.dtype}")
         mask &= held
     if not mask.any():
         raise DesignError(f"no candidate run keeps the constraints {list(constraints)}")
@@ -125,7 +121,7 @@ def allowed(
 
 
 def _candidates(factors: Sequence[Factor], levels: int | None, seed: int) -> pd.DataFrame:
-    """Return the runs to choose from: a grid, or Sobol points and the corners where the grid is too large."""
+    """Return the candidate runs: a grid, or Sobol points and the corners where the grid is too large."""
     if levels is None:
         levels = 5 if 5.0 ** len(factors) <= CANDIDATE_BUDGET else 3
     levels = checked_count("levels", levels, least=2, most=MOST)
@@ -167,9 +163,9 @@ def _moments(
 def _kept(
     existing: Design, factors: tuple[Factor, ...], model: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the columns of the runs that stay, blocks included, and the blocks' columns of a new run."""
+    """Return the columns of the existing runs, blocks included, and the blocks' columns of a new run."""
     if existing.factors != factors:
-        raise DesignError("existing is a design of the same factors, with the same ranges")
+        raise DesignError("existing must be a design of the same factors, with the same ranges")
     labels = ["existing"] * len(existing.coded) if existing.blocks is None else list(existing.blocks)
     blocks = block_columns(pd.Series([*labels, object()], dtype=object), pd.RangeIndex(len(labels) + 1))
     columns = model_columns(existing.points, factors, model)
@@ -184,7 +180,7 @@ def _start(
         rows = rng.integers(len(expanded), size=runs)
         if np.linalg.cond(np.vstack([expanded[rows], kept])) < 1e10:
             return rows
-    # Random rows seldom span a narrow region: take the rows that add most, one after the other.
+    # random rows seldom span a narrow region: take the rows that add most, one after the other
     matrix = kept.T @ kept + 1e-6 * np.eye(expanded.shape[1])
     greedy = []
     for _ in range(runs):
@@ -229,10 +225,10 @@ def _criterion(matrix: NDArray[np.float64], moments: NDArray[np.float64] | None)
 def _scores(
     without: NDArray[np.float64], expanded: NDArray[np.float64], moments: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
-    """Return for every candidate what it leaves of the criterion when it joins the other runs.
+    """Return for every candidate the criterion after it joins the other runs.
 
     det(M + xx') = det(M) (1 + x'Vx) and (M + xx')^-1 = V - Vxx'V / (1 + x'Vx), with V the inverse of M, which
-    is made regular by a little where the run that left was needed.
+    a small ridge makes regular where the run that left was needed.
     """
     ridge = 1e-9 * np.trace(without) / len(without)
     inverse = np.linalg.inv(without + ridge * np.eye(len(without)))

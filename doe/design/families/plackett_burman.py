@@ -12,42 +12,41 @@ from doe.design.families.hadamard import constructible, screening_matrix, worst_
 from doe.errors import DesignError
 
 DEFAULT_RUNS = 12
-"""Smallest default size: in 12 runs no interaction hides wholly in one factor's column."""
+"""Smallest default size: in 12 runs no interaction coincides wholly with one factor's column."""
 
 RESOLUTION_V = {16: 5, 32: 6, 64: 8, 128: 11}
-"""Most factors of a regular fraction of resolution V, by its runs."""
+"""Largest number of factors of a regular fraction of resolution V, by its runs."""
 
 MOST_RUNS = 1_000
-"""Larger matrices take minutes."""
+"""Largest number of runs; larger matrices take minutes."""
 
 
 def plackett_burman(factors: Iterable[Factor], runs: int | None = None, seed: int | None = None) -> Design:
     """Return the Plackett-Burman design of the factors.
 
     Every column is orthogonal to every other. The factors take the first columns, the rest are dummies
-    (``dummy1``, ...): what they estimate is error and interactions. Where N is a power of two up to 16,
-    interactions of two factors fall wholly into single columns; elsewhere they spread over many. In 12, 20,
-    24, 28 and 36 runs these are the published tables; in more, the matrix and the order of its columns in
-    which an interaction of the factors falls least onto another factor. The design's ``notes`` say how much
-    that is, and where a design in the same number of runs keeps main effects and interactions apart.
+    (``dummy1``, ...), which estimate error and interactions. Where N is a power of two up to 16, interactions
+    of two factors coincide with single columns; elsewhere they spread over many. In 12, 20, 24, 28 and 36
+    runs these are the published tables; in more, the matrix and the order of its columns in which an
+    interaction of the factors affects another factor least. The design's ``notes`` state that effect, and a
+    design of the same size that separates main effects and interactions.
 
-    Own code: pyDOE3 1.6.2 refuses 28, 36, 44, 52 and 56 runs, and lays interactions wholly onto factors in 24
-    and 48. process-improve 2.2.0 has all sizes, but lays .6 of an interaction onto one of the first six
-    factors in 40 runs, .39 in 52 and .29 in 56, where these columns lay none, .08 and none.
+    pyDOE3 1.6.2 rejects 28, 36, 44, 52 and 56 runs, and aliases interactions wholly with factors in 24 and
+    48; process-improve 2.2.0 aliases .6 of an interaction with one of the first six factors in 40 runs.
 
     Parameters
     ----------
     factors : iterable of Factor
         Numbers, or categories of two levels.
     runs : int, optional
-        A multiple of 4 above the number of factors; default 12, or the next size that holds them.
+        A multiple of 4 above the number of factors. Default: 12, or the next size that holds them.
     seed : int, optional
-        Seed of the run order; None keeps the standard order.
+        Seed of the run order. Default: the standard order.
 
     Raises
     ------
     DesignError
-        Too few runs for the factors, or a size for which no construction is known here.
+        Too few runs for the factors, or a size without a construction here.
     """
     factors = two_level_factors(factors, "a Plackett-Burman design")
     if runs is None:
@@ -66,7 +65,7 @@ def plackett_burman(factors: Iterable[Factor], runs: int | None = None, seed: in
 
 
 def _notes(runs: int, factor_count: int, worst: float) -> tuple[str, ...]:
-    """Say how far interactions fall onto factors, and which design of the same size does better."""
+    """Describe the bias of effects by interactions, and a better design of the same size."""
     notes = []
     if worst > 0.0:
         share = "the whole of it" if worst > 1.0 - 1e-9 else f"{100.0 * worst:.0f} % of it"

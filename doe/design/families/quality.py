@@ -1,4 +1,4 @@
-"""A design judged before anything is run: efficiencies, variance inflation, and what effects it will find."""
+"""Quality of a design before its runs: efficiencies, variance inflation, and power."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class DesignQuality:
     prediction_variance: float
     """Variance of a prediction, averaged over the box."""
     vif: pd.Series
-    """Variance inflation of each coefficient by the others: 1 where it is orthogonal to them."""
+    """Variance inflation of each coefficient by the others: 1 for orthogonal ones."""
 
     def __str__(self) -> str:
         worst = f"{self.vif.idxmax()} {self.vif.max():.2f}" if len(self.vif) else "none"
@@ -54,17 +54,16 @@ def design_quality(
 
     Parameters
     ----------
-    design : Design
     model : {"first-order", "interaction", "quadratic", "three-factor"}
     constraints : sequence of str or callable
-        Rules for the natural values that limit where predictions are made (see ``optimal_design``).
+        Rules for the natural values that limit the place of predictions (see ``optimal_design``).
     seed : int
-        Of the Sobol points that predictions are averaged over.
+        Seed of the Sobol points that predictions are averaged over.
 
     Raises
     ------
     DesignError
-        The design cannot tell the model's terms apart.
+        The design cannot distinguish the model's terms.
     """
     checked_kind("design", design, Design)
     matrix = _full_matrix(design, model)
@@ -96,15 +95,14 @@ def power_table(
     replicates: int = 1,
     alpha: float = 0.05,
 ) -> pd.DataFrame:
-    """Return how likely each term is found significant, before anything is run.
+    """Return the probability that each term is found significant, before its runs.
 
     An effect is the change of the response from -1 to +1, twice the coefficient; for a square it is the
     change from the center to +1, the coefficient itself. Powers are those of the t test with the residual of
-    the model (noncentral t), which blocks, replicates and dummies count into.
+    the model (noncentral t), which blocks, replicates and dummies affect.
 
     Parameters
     ----------
-    design : Design
     effects : sequence of float
         Sizes of effects, in the unit of ``sd``.
     model : {"first-order", "interaction", "quadratic", "three-factor"}
@@ -112,24 +110,23 @@ def power_table(
         Standard deviation of one observation.
     replicates : int
         Observations of every run.
-    alpha : float
 
     Returns
     -------
-    DataFrame, one row a term
+    DataFrame, one row per term
         se (of the effect), vif, df (of the error), and ``power at E`` for each effect.
 
     Raises
     ------
     DesignError
-        No degrees of freedom for the error, or terms that the runs cannot tell apart.
+        No degrees of freedom for the error, or terms that the runs cannot distinguish.
     """
     checked_kind("design", design, Design)
     sd, replicates = checked_number("sd", sd, above=0.0), checked_count("replicates", replicates)
     alpha = checked_level(alpha)
     sizes = [checked_number("an effect", effect) for effect in checked_list("effects", effects)]
     if not sizes:
-        raise DesignError("a power table takes one effect or more, got none")
+        raise DesignError("effects must be one or more, got an empty list")
     matrix = _full_matrix(design, model)
     columns = model_columns(design.points, design.factors, model)
     count = columns.shape[1]
@@ -156,8 +153,8 @@ def _full_matrix(design: Design, model: str) -> np.ndarray:
     matrix = np.column_stack([columns, block_columns(design.blocks, columns.index)])
     if np.linalg.matrix_rank(matrix) < matrix.shape[1]:
         raise DesignError(
-            f"{len(matrix)} runs cannot tell the {matrix.shape[1]} coefficients of the {model} model (blocks "
-            "included) apart"
+            f"{len(matrix)} runs cannot distinguish the {matrix.shape[1]} coefficients of the {model} model "
+            "(blocks included)"
         )
     return matrix
 

@@ -4,11 +4,10 @@ from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
-import pandas as pd
 from scipy.stats import qmc
 
 from doe.arguments import MOST, checked_choice, checked_count, checked_seed
-from doe.design.design import Design, numbered
+from doe.design.design import Design, design_of_blocks
 from doe.design.factors import Factor, numeric_factors
 from doe.errors import DesignError
 
@@ -22,14 +21,10 @@ def latin_hypercube(
     seed: int,
     optimize: Literal["random-cd", "lloyd"] | None = "random-cd",
 ) -> Design:
-    """Return a Latin hypercube: cut into as many slices as runs, each factor has one run in every slice.
+    """Return a Latin hypercube: each factor has one run in each of as many slices as runs.
 
     Parameters
     ----------
-    factors : iterable of Factor
-    runs : int
-    seed : int
-        The same seed gives the same design.
     optimize : {"random-cd", "lloyd"} or None
         Even out the points: by exchanges that lower the centered discrepancy, which keep the slices, or by
         moving them apart, which does not (see ``scipy.stats.qmc.LatinHypercube``).
@@ -48,18 +43,17 @@ def sobol(factors: Iterable[Factor], runs: int, *, seed: int | None = None) -> D
 
     Parameters
     ----------
-    factors : iterable of Factor
     runs : int
         A power of two: other numbers lose the balance of the sequence.
     seed : int, optional
-        Seed of Owen's scrambling; None takes the plain sequence, whose first run has every factor low.
+        Seed of Owen's scrambling. Default: the plain sequence, whose first run has every factor low.
     """
     factors = numeric_factors(factors, "a Sobol design")
     runs = checked_count("runs of a Sobol design", runs, least=2, most=MOST)
     if runs & (runs - 1):
         below = 1 << max(runs.bit_length() - 1, 1)
         raise DesignError(
-            f"a Sobol design has a power of two of runs, such as {below} or {2 * below}, got {runs}"
+            f"runs of a Sobol design must be a power of two, such as {below} or {2 * below}, got {runs}"
         )
     seed = checked_seed(seed)
     sampler = qmc.Sobol(len(factors), scramble=seed is not None, rng=np.random.default_rng(seed or 0))
@@ -68,5 +62,4 @@ def sobol(factors: Iterable[Factor], runs: int, *, seed: int | None = None) -> D
 
 def _design(factors: tuple[Factor, ...], unit: np.ndarray) -> Design:
     """Return the design of points in the unit cube."""
-    names = [factor.name for factor in factors]
-    return Design(factors, numbered(pd.DataFrame(2.0 * unit - 1.0, columns=names)))
+    return design_of_blocks(factors, [2.0 * unit - 1.0], None)

@@ -1,6 +1,4 @@
-"""Fresh runs in waves: which points, with which seeds, and what came back."""
-
-from __future__ import annotations
+"""Fresh runs in batches: their points, seeds and outcomes."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
@@ -13,14 +11,15 @@ from doe.discrepancy.problem.outcomes import Outcomes, Point
 from doe.errors import RuleError
 
 DIGITS = 4
-"""Decimals of the coded points of fresh runs: fits whose last bits differ by the host ask for the same."""
+"""Decimals of the coded points of fresh runs: fits whose last bits differ by the host ask for the same
+points."""
 
-Waves = Generator[list[Point], Outcomes, list[Runs]]
+Batches = Generator[list[Point], Outcomes, list[Runs]]
 
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """Runs of one model."""
+    """Requested runs of one model."""
 
     mechanisms: tuple[str, ...]
     x: np.ndarray
@@ -29,15 +28,13 @@ class Request:
     """Runs of each point, in every condition."""
 
 
-class Laboratory:
-    """Sends waves of points and keeps count; every case of a data set has its own seed.
+class FreshRuns:
+    """Source of fresh runs, with a count; every case of a data set has its own seed.
 
     Parameters
     ----------
-    emulator : Emulator
     conditions : sequence of str
-        Where every point is run.
-    seed : int
+        Conditions under which every point is run.
     """
 
     def __init__(self, emulator: Emulator, conditions: Sequence[str], seed: int) -> None:
@@ -46,20 +43,17 @@ class Laboratory:
         self.seed = seed
         self.cases = 0
         self.failures = 0
-        self._waves = 0
+        self._batches = 0
 
     @property
     def runs_end(self) -> bool:
-        """True if any run has ended; of published tables none can be had."""
+        """True if any run has ended; published tables give no fresh runs."""
         return self.failures < self.cases
 
-    def wave(self, requests: Sequence[Request]) -> Waves:
-        """Yield the points of one wave, be sent their outcomes, return the finished runs by request.
+    def batch(self, requests: Sequence[Request]) -> Batches:
+        """Yield the points of one batch, receive their outcomes, return the finished runs by request.
 
-        Raises
-        ------
-        RuleError
-            When there are not as many outcomes as points.
+        Raises RuleError: another number of outcomes than of points.
         """
         cases = [
             (number, row, condition)
@@ -68,16 +62,16 @@ class Laboratory:
             for _ in range(request.repeats)
             for condition in self.conditions
         ]
-        self._waves += 1
-        seeds = np.random.SeedSequence([self.seed, self._waves]).generate_state(len(cases)) >> 1
+        self._batches += 1
+        seeds = np.random.SeedSequence([self.seed, self._batches]).generate_state(len(cases)) >> 1
         space = self.emulator.space
         outcomes = yield [
             space.point(row, requests[number].mechanisms, condition, int(seed))
             for (number, row, condition), seed in zip(cases, seeds, strict=True)
         ]
         if len(outcomes.reasons) != len(cases):
-            rule = f"needs an outcome for each of {len(cases)} points"
-            raise RuleError("wave", rule, len(outcomes.reasons))
+            rule = f"must have one for each of {len(cases)} points"
+            raise RuleError("outcomes", rule, len(outcomes.reasons))
         self.cases += len(cases)
         self.failures += int((~outcomes.finished).sum())
         owners = np.array([number for number, _, _ in cases])

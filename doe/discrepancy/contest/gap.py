@@ -1,6 +1,4 @@
-"""The gap: disagreement of a calibrated model with the data beyond the noise, and where it lies."""
-
-from __future__ import annotations
+"""The gap: disagreement of a calibrated model with the data beyond the noise, and its place."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +14,7 @@ from doe.discrepancy.fitting.model_fit import Fitted, fit
 
 
 class Question(StrEnum):
-    """Questions to the residuals of a model."""
+    """Question to the residuals of a model."""
 
     SIZE = "size"
     """Are they too large? Q."""
@@ -37,17 +35,16 @@ class Answer:
     limit: float
     """The statistic, and the point that the bootstrap exceeds at the level of the rules."""
     mechanism: str = ""
-    """Of the fall; empty with the other questions."""
+    """Mechanism of the fall; empty with the other questions."""
 
 
 OF_THE_BASE = (Question.SIZE, Question.FALL, Question.SCORES)
-"""Asked of a model to which a mechanism of the library may be added. The last looks where mechanisms act at
-all, whichever way: there lies, most likely, what the library lacks, too."""
+"""Questions to a model to which a mechanism may be added. The last looks where mechanisms act in either
+direction: an effect that the library lacks most likely acts there too."""
 
 OF_A_CANDIDATE = (Question.SIZE, Question.COMMON)
-"""Asked of a model that is to be believed. What the library lacks moves an observable in all conditions, and
-an emulator errs here and there. In blind trials on a simulator these refused, at 10 %, 215 of the 228
-best candidates, single or pair, for what the library lacked, and 15 of the 310 true models."""
+"""Questions to a model that is to be believed. A missing effect moves an observable in all conditions, and an
+emulator errs here and there (``trials/record/README.md``)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +55,7 @@ class GapTest:
     freedom: int
     """Sum of squares of what a refit leaves, and its degrees of freedom."""
     q_limit: float
-    """The point that ``level`` of the bootstrap exceeds."""
+    """Point that ``level`` of the bootstrap exceeds."""
     mechanisms: tuple[str, ...]
     scores: np.ndarray
     """z of the visible signature of each in the residuals, (mechanisms,)."""
@@ -66,11 +63,11 @@ class GapTest:
     drop_limit: float
     """Largest fall of Q that a positive size of one mechanism brings, and its limit."""
     mechanism: str
-    """Of that fall; empty without a library."""
+    """Mechanism of that fall; empty without a library."""
     p: float
-    """Of the smallest p value of the questions asked, by the same bootstrap."""
+    """P value of the smallest p value of the questions asked, by the same bootstrap."""
     clearest: Answer
-    """To the question of that smallest p value; beyond its limit where there is a gap."""
+    """Answer to the question of that smallest p value; beyond its limit where there is a gap."""
     level: float
 
     @property
@@ -94,21 +91,10 @@ def find_gap(
 ) -> GapTest:
     """Test a calibrated model by parametric bootstrap, each draw refitted (linearised at the optimum).
 
-    Conditions that took no part in the calibration may be among those of ``fitted``: what a linear refit to
-    all leaves has the same sum of squares as what the calibration leaves and what its forecasts then miss,
-    each against its own uncertainty.
-
-    Parameters
-    ----------
-    fitted : Fitted
-        Weighed on all conditions that are to be looked at.
-    seen : Signatures
-        Of the mechanisms that it lacks.
-    level : float
-        Probability of a gap where there is none.
-    draws, seed : int
-    questions : sequence of Question
-        Which decide.
+    The model is weighed on all conditions to be tested, those outside the calibration included: the sum of
+    squares after a linear refit to all is that after the calibration plus that of the errors of its
+    forecasts, each against its own uncertainty. ``seen`` has the signatures of the mechanisms that it lacks,
+    ``level`` the probability of a false gap.
     """
     project = projector(fitted.sensitivities)
     noise = np.random.default_rng(seed).standard_normal((draws, len(project))) @ project
@@ -145,9 +131,9 @@ def find_gap(
 
 
 def _common_directions(fitted: Fitted, project: np.ndarray) -> np.ndarray:
-    """Basis of what a refit leaves of an observable's being off alike in all conditions, (k, means).
+    """Return a basis of deviations of an observable alike in all conditions, after a refit, (k, means).
 
-    Alike: by as many standard deviations of its mean.
+    Alike means by as many standard deviations of its mean.
     """
     columns = np.concatenate([block.columns for block in fitted.stack.blocks])
     deviations = np.sqrt(np.diag(fitted.covariance))
@@ -158,9 +144,9 @@ def _common_directions(fitted: Fitted, project: np.ndarray) -> np.ndarray:
 def _statistics(
     residuals: np.ndarray, signatures: np.ndarray, count: int, common: np.ndarray
 ) -> dict[Question, np.ndarray]:
-    """Compute the statistic of each question, of residuals (..., n).
+    """Compute the statistic of each question for residuals (..., n).
 
-    So many signatures are of different mechanisms, the others of some of these from behind.
+    The first ``count`` signatures are of different mechanisms, the others of some of these from behind.
     """
     scores = residuals @ signatures.T
     return {
@@ -176,12 +162,12 @@ def _exceeded(drawn: np.ndarray, value: float) -> float:
 
 
 def _own_p(drawn: np.ndarray) -> np.ndarray:
-    """Share of the draws that are at least as large as each."""
+    """Return the share of the draws that are at least as large as each."""
     return np.asarray((len(drawn) + 1.0 - stats.rankdata(drawn, method="min")) / len(drawn))
 
 
 def holm(p_values: np.ndarray) -> np.ndarray:
-    """P values adjusted for being many (Holm 1979), same shape (n,)."""
+    """Return p values adjusted for their number (Holm 1979), same shape (n,)."""
     order = np.argsort(p_values)
     adjusted = np.maximum.accumulate(p_values[order] * np.arange(len(order), 0, -1)).clip(max=1.0)
     out = np.empty_like(adjusted)
@@ -196,7 +182,7 @@ def condition_fits(fitted: Fitted) -> list[Fitted]:
 
 
 def drift_p(values: np.ndarray, errors: np.ndarray) -> float:
-    """P value of the hypothesis that values with independent errors are one."""
+    """Return the p value of the hypothesis that values with independent errors are equal."""
     weights = errors**-2.0
     mean = np.sum(weights * values) / np.sum(weights)
     return float(stats.chi2.sf(np.sum(weights * (values - mean) ** 2), len(values) - 1))

@@ -1,6 +1,4 @@
-"""Forecasts of the conditions that took no part in a fit, and their score."""
-
-from __future__ import annotations
+"""Forecasts of the conditions outside a fit, and their score."""
 
 from dataclasses import dataclass
 
@@ -13,25 +11,25 @@ from doe.discrepancy.fitting.model_fit import Fitted, Interval, whiten
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """Predicted means of some conditions, with what is unknown of them."""
+    """Predicted means of some conditions, with the covariance of their errors."""
 
     measured: np.ndarray
     predicted: np.ndarray
     """(means,)."""
     covariance: np.ndarray
-    """Of their difference: noise, emulator and the fitted parameters, (means, means)."""
+    """Covariance of their difference: noise, emulator and the fitted parameters, (means, means)."""
     noise: np.ndarray
-    """Of the measured means alone, (means, means)."""
+    """Covariance of the measured means alone, (means, means)."""
 
     def log_score(self, measured: np.ndarray) -> np.ndarray:
-        """Logarithm of the predicted density of measured means (..., means), but for a constant."""
+        """Return the log density predicted for measured means (..., means), but for a constant."""
         whitening = whiten(self.covariance)
         residual = (measured - self.predicted) @ whitening.T
         return np.asarray(np.log(np.diag(whitening)).sum() - 0.5 * (residual**2).sum(axis=-1))
 
 
 def forecast(fitted: Fitted, blocks: tuple[Block, ...]) -> Forecast:
-    """Predict conditions from a fit to others; what the fit shows to be off alike, is off there, too."""
+    """Predict conditions from a fit to others; common errors that the fit shows apply there too."""
     seen, stack = fitted.stack, Stack(fitted.model, blocks)
     shared = stack.common.T @ seen.common @ fitted.whitening.T
     slopes = stack.jacobian(fitted.x[None])[0]
@@ -46,10 +44,7 @@ def held_out_gain(
 ) -> Interval | None:
     """Compute the gain of the log score over the base, with its 90 % interval over the replicates' noise.
 
-    Returns
-    -------
-    Interval or None
-        None where no held-out condition was measured.
+    It is None where no held-out condition was measured.
     """
     if not blocks:
         return None

@@ -1,4 +1,4 @@
-"""The power of data: from which size on a mechanism is found, and told from every other."""
+"""The power of data: the size from which on a mechanism is found and distinguished from every other."""
 
 from __future__ import annotations
 
@@ -16,20 +16,19 @@ from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.space import SearchSpace
 
 CODED_SIZES = np.linspace(0.0, 1.0, 201)[1:]
-"""Coded sizes that the smallest visible one is searched on."""
+"""Coded sizes among which the smallest visible one is searched."""
 KNOTS = np.linspace(0.0, 1.0, 11)
-"""Coded sizes at which calibration is asked what it takes up; straight in between."""
+"""Coded sizes at which the share that calibration takes up is computed; linear in between."""
 TRUSTED = 0.8
-"""Part of an effect that an emulator is right about. In blind trials on a simulator a mechanism most of
-which looks like another value of a factor was seen with 0.7 (median) of the standard deviations that it
-promised."""
+"""Trusted share of an emulated effect: mechanisms that resemble a factor showed 0.7 (median) of the standard
+deviations that it promised (``trials/record/README.md``)."""
 SAME = (1.0 - (1.0 - TRUSTED) ** 2) ** 0.5
-"""Correlation from which two signatures are one: they differ by less than that."""
+"""Correlation from which two signatures are the same: they differ by less than that share."""
 
 
 @dataclass(frozen=True, eq=False)
 class Effects:
-    """Effects of mechanisms of every size beside a fitted model, a refit of which takes up its part."""
+    """Effects of mechanisms of every size added to a fitted model, less the part that a refit takes up."""
 
     names: tuple[str, ...]
     visible: np.ndarray
@@ -37,23 +36,23 @@ class Effects:
     whole: np.ndarray
     """Squared lengths without the refit, (mechanisms, sizes)."""
     chance: np.ndarray
-    """Part of the noise of the bank in the squared visible lengths: where a mechanism does nothing, the
+    """Part of the squared visible lengths due to the noise of the bank: where a mechanism does nothing, the
     emulator still shows something, (mechanisms, sizes)."""
     unknown: np.ndarray
-    """Part in them of all that the bank leaves open of the mechanism's addition, (mechanisms, sizes)."""
+    """Part of them due to all that the bank leaves open of the mechanism's addition, (mechanisms, sizes)."""
     correlations: np.ndarray
     """Between visible signatures, (mechanisms, mechanisms)."""
 
     @classmethod
     def of(cls, fitted: Fitted, seen: Signatures) -> Effects:
-        """Of the mechanisms that are not in a fitted model.
+        """Compute the effects of the mechanisms that are not in a fitted model.
 
-        The refit is one in full, within the ranges: what looks unlike any small change of the factors may be
+        The refit is a full one, within the ranges: an effect unlike any small change of the factors may be
         like a large one.
         """
         stack, theta = fitted.stack, fitted.x[: len(fitted.model.emulator.space.factors)]
         shape = (len(seen.names), len(KNOTS), len(fitted.covariance))
-        if not seen.names:  # none does anything, or all were left out
+        if not seen.names:  # no mechanism has an effect, or all were left out
             none = np.empty((0, len(CODED_SIZES)))
             return cls((), np.empty((*none.shape, shape[-1])), none, none, none, seen.correlations)
         extra = np.reshape(
@@ -75,19 +74,17 @@ class Effects:
         return np.asarray((self.visible**2).sum(axis=2))
 
     def apart(self, index: int, errors: np.ndarray) -> np.ndarray:
-        """Squared distance of a mechanism of every size from each other one, (mechanisms, sizes).
+        """Return squared distances of a mechanism of every size from each other one, (mechanisms, sizes).
 
-        The other has the size in its range that is nearest, or none. Each was fitted to runs of its own: two
-        that do the same are as far apart as the errors of both, so these are taken off. Those whose
-        signatures correlate by `SAME` or more are one to an emulator; of the mechanism itself nothing is
-        nearest.
+        The other has its nearest size, or is absent. Each was fitted to runs of its own: two equal mechanisms
+        are as far apart as the errors of both, so these are taken off. Mechanisms whose signatures correlate
+        by `SAME` or more are the same to an emulator.
 
         Parameters
         ----------
-        index : int
         errors : (mechanisms, sizes) array
-            Parts in the squared visible lengths: `chance` for the likely distance, `unknown` for what the
-            bank has shown of it.
+            Parts in the squared visible lengths: `chance` for the likely distance, `unknown` for the distance
+            that the bank has shown.
         """
         squares, sizes = self.squares, np.arange(len(CODED_SIZES))
         out = np.repeat(squares[index][None], len(self.names), axis=0)
@@ -102,16 +99,12 @@ class Effects:
         return out
 
     def power(self, settings: Settings) -> np.ndarray:
-        """Probability that a mechanism of every size is found and told from every other.
+        """Return the probability that each mechanism is found and distinguished, (mechanisms, sizes).
 
-        It is found where its visible effect, less what an emulator may be wrong about and what chance adds to
-        it, is ``least_ratio`` standard deviations. It is told from a rival where that is further behind in Q
-        than a tie: the difference in Q of models d apart is d^2 +- 2 d.
-
-        Returns
-        -------
-        (mechanisms, sizes) array
-            The smaller of the two probabilities.
+        It is found where its visible effect, less the emulator's error and the effect of chance, is
+        ``least_ratio`` standard deviations. It is distinguished from a rival that is further behind in Q than
+        a tie: the difference in Q of models d apart is d^2 +- 2 d. The smaller of the two probabilities
+        counts.
         """
         trusted = np.maximum(self.squares - (1.0 - TRUSTED) ** 2 * self.whole - self.chance, 0.0)
         found = stats.norm.cdf(np.sqrt(trusted) - settings.least_ratio)
@@ -122,9 +115,9 @@ class Effects:
 
 
 def _errors(fitted: Fitted, names: Sequence[str], theta: np.ndarray) -> np.ndarray:
-    """Parts of errors in squared visible lengths, at the coded `KNOTS`, (2, mechanisms, knots).
+    """Return parts of errors in squared visible lengths at the coded `KNOTS`, (2, mechanisms, knots).
 
-    Of chance, and of all that is open; see `Effects`.
+    The first is that of chance, the second that of all that is open; see `Effects`.
     """
     left = projector(fitted.sensitivities) @ fitted.whitening
     terms = added(np.repeat(theta[None], len(KNOTS), axis=0), KNOTS)
@@ -143,14 +136,9 @@ def _errors(fitted: Fitted, names: Sequence[str], theta: np.ndarray) -> np.ndarr
 
 
 def shown_apart(effects: Effects, name: str, coded_size: float) -> dict[str, float]:
-    """Compute by how much Q of every other mechanism, refitted, is above that of one of a coded size.
+    """Compute by other mechanism how far its Q, refitted, is above that of one of a coded size.
 
-    So much of it as is beyond the errors of the bank's emulator.
-
-    Returns
-    -------
-    dict
-        By the other's name.
+    Only the part beyond the errors of the bank's emulator counts.
     """
     index = effects.names.index(name)
     apart = effects.apart(index, effects.unknown)[:, np.abs(CODED_SIZES - coded_size).argmin()]
@@ -159,32 +147,22 @@ def shown_apart(effects: Effects, name: str, coded_size: float) -> dict[str, flo
 
 @dataclass(frozen=True)
 class Power:
-    """The smallest size of a mechanism that the data could show and tell from every other."""
+    """The smallest size of a mechanism that the data can show and distinguish from every other."""
 
     mechanism: str
     detectable_size: float
-    """Size found and told apart with the power of the settings (80 %); infinite if none in its range is."""
+    """Size found and distinguished with the power of the settings (80 %); infinite if the range has no such
+    size."""
     maximum: float
-    """End of its range."""
+    """End of the range."""
     visible_share: float
     """Share of its squared signature that calibration cannot take up."""
     resolvable: bool
-    """True if its range has such a size, as the emulator has it; or what was declared."""
+    """True if the range has such a size, by the emulator or by declaration."""
 
 
 def powers(effects: Effects, shares: np.ndarray, space: SearchSpace, settings: Settings) -> tuple[Power, ...]:
-    """Power of the data for every mechanism.
-
-    Parameters
-    ----------
-    effects : Effects
-        Beside the calibrated base.
-    shares : (mechanisms,) array
-        See `Power`.
-    space : SearchSpace
-        Ranges of the mechanisms.
-    settings : Settings
-    """
+    """Return the power of the data for every mechanism, with its visible share (`Power`)."""
     out = []
     for name, power, share in zip(effects.names, effects.power(settings), shares, strict=True):
         coded = detectable_coded_size(power, settings)
@@ -195,13 +173,6 @@ def powers(effects: Effects, shares: np.ndarray, space: SearchSpace, settings: S
 
 
 def detectable_coded_size(power: np.ndarray, settings: Settings) -> float:
-    """Smallest coded size that is shown with the power of the settings, infinite if none is.
-
-    Parameters
-    ----------
-    power : (sizes,) array
-        At `CODED_SIZES`.
-    settings : Settings
-    """
+    """Return the smallest size of `CODED_SIZES` with the power of the settings; infinite if there is none."""
     shown = power >= settings.power
     return float(CODED_SIZES[shown.argmax()]) if shown.any() else float("inf")

@@ -1,11 +1,9 @@
-"""Rivals: when it stays open which of two models is right.
+"""Rivals: cases in which it is open which of two models is right.
 
-The noise of the measured means is in the residuals of both, and moves both Qs alike. What the bank and fresh
-runs leave open of a prediction is in the residuals of that model alone: two emulators of one truth err each
-by itself, and their Qs part though nothing parts the models.
+The noise of the measured means is in the residuals of both models and moves both Qs alike. The error of each
+prediction is in the residuals of that model alone: two emulators of one truth err independently, and their Qs
+differ although the models do not.
 """
-
-from __future__ import annotations
 
 import math
 
@@ -20,22 +18,12 @@ CHANCE = 1.645
 
 
 def is_open(behind: float, apart: float, margin: float, parting: float = 0.0) -> bool:
-    """Say if it stays open which of two models is right, one of which is so much behind.
+    """Return True if it is open which of two models is right, given how far one is behind in Q.
 
-    Of models d standard deviations apart the wrong one is behind by d^2 +- 2 d. Two that should look the
-    same, their d^2 being below the margin, are told apart where chance does so in one case of twenty at most.
-    The right one is behind by -d^2 +- (4 d^2 + parting^2)^.5. Where that passes the margin in more cases than
-    one of twenty, as it does if little is known of the predictions, it takes so much more to tell them apart.
-
-    Parameters
-    ----------
-    behind : float
-        In Q, held-out conditions included.
-    apart : float
-        d^2 as it was shown; infinite where the two are of several mechanisms.
-    margin : float
-    parting : float
-        Of the two (`parting`).
+    Of models d standard deviations apart (``apart`` = d^2; infinite for several mechanisms) the wrong one is
+    behind by d^2 +- 2 d. Two that look the same, with d^2 below the margin, are distinguished where chance
+    does so in at most one case of twenty. The right one is behind by -d^2 +- (4 d^2 + parting^2)^.5; where
+    that passes the margin in more than one case of twenty, the margin grows accordingly.
     """
     needed = _margin_of_alike(margin) if apart < margin else margin
     if math.isfinite(apart):
@@ -48,7 +36,7 @@ def _margin_of_alike(margin: float) -> float:
 
 
 def telling_apart(margin: float, power: float) -> float:
-    """Compute the Q between two models at which they are told apart with so much power (`is_open`).
+    """Compute the Q between two models at which they are distinguished with a power (`is_open`).
 
     The wrong one is behind by d^2 +- 2 d, which passes the margin of models that look the same.
     """
@@ -57,17 +45,12 @@ def telling_apart(margin: float, power: float) -> float:
 
 
 def lag(score: float, sure: float, margin: float) -> float:
-    """Distance of a model behind the best in minus twice the log-likelihood.
+    """Return the distance of a model behind the best in minus twice the log-likelihood.
 
-    The likelihood of a model suffers where its predictions are uncertain, as they are before it has been run
-    enough, and that of the best gains by every run of it: that says how much is known of a model, and
-    nothing of the data. It counts for half a tie at most: a model that is named is ahead without it, too.
-
-    Parameters
-    ----------
-    score, sure : float
-        Differences to the best of minus twice the log-likelihood, and of `certain`.
-    margin : float
+    The likelihood of a model is low where its predictions are uncertain, as before it has been run enough,
+    and that of the best gains by every run of it: that describes the knowledge of a model, not the data. It
+    counts for half a tie at most: a named model is ahead without it, too. ``sure`` is the difference of
+    `certain`.
     """
     return min(score, sure + margin / 2.0)
 
@@ -83,20 +66,11 @@ def certain(fitted: Fitted) -> float:
 
 
 def parting(one: Fitted, other: Fitted) -> float:
-    """Standard deviation of the difference of the Qs of two refitted models, if both predict the truth.
+    """Return the standard deviation of the difference of the Qs of two refitted models, if both are right.
 
-    With residuals u + e, u being common to both and e of covariance E each model's own, Q is r' G r, and of
-    normal residuals cov(r' G r, s' H s) = 2 tr(G cov(r, s) H cov(s, r)).
-
-    Parameters
-    ----------
-    one, other : Fitted
-        Weighed on the same means.
-
-    Returns
-    -------
-    float
-        0 if nothing is open of either prediction.
+    With residuals u + e, u common to both and e of covariance E each model's own, Q is r' G r, and of normal
+    residuals cov(r' G r, s' H s) = 2 tr(G cov(r, s) H cov(s, r)). Both are weighed on the same means. It is 0
+    if nothing is open of either prediction.
     """
     metrics, variance = [], 0.0
     for fitted in (one, other):
@@ -108,5 +82,5 @@ def parting(one: Fitted, other: Fitted) -> float:
 
 
 def _shared(fitted: Fitted) -> np.ndarray:
-    """Covariance of the residuals but for what is open of the prediction, (means, means)."""
+    """Return the covariance of the residuals without the error of the prediction, (means, means)."""
     return np.asarray(fitted.covariance - fitted.stack.open_error(fitted.x))

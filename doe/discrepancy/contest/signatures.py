@@ -1,6 +1,4 @@
-"""Signatures: the mark of each mechanism in the data, beyond what a calibration of the factors takes up."""
-
-from __future__ import annotations
+"""Signatures: the mark of each mechanism in the data, beyond what calibrated factors take up."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -13,15 +11,15 @@ from doe.discrepancy.fitting.measured_means import Block
 from doe.discrepancy.fitting.model_fit import Fitted
 
 SECANT = 0.5
-"""Coded size at which a signature is taken: an effect a unit of size."""
+"""Coded size at which a signature is taken: effect per unit of size."""
 LEAST_LENGTH = 1e-6
-"""A signature that is shorter (whitened) is not seen at all."""
+"""Length of a (whitened) signature below which it is invisible."""
 
 
 def signature(
     model: Model, blocks: Sequence[Block], theta: np.ndarray, name: str, heading: float = 0.0
 ) -> np.ndarray:
-    """Compute what a mechanism adds to the means of conditions for a unit of its coded size, (means,)."""
+    """Compute the addition of a mechanism to the means of conditions per unit of its coded size, (means,)."""
     return secants(model, blocks, theta, name, np.array([SECANT]), heading)[0] / SECANT
 
 
@@ -33,7 +31,7 @@ def secants(
     sizes: np.ndarray,
     heading: float = 0.0,
 ) -> np.ndarray:
-    """Compute what a mechanism adds, as emulated, to the means at coded sizes (n,), (n, means)."""
+    """Compute the emulated addition of a mechanism to the means at coded sizes (n,), (n, means)."""
     x = np.column_stack([np.repeat(theta[None], len(sizes), axis=0), sizes])
     parts = []
     for block in blocks:
@@ -45,22 +43,22 @@ def secants(
 
 
 def projector(sensitivities: np.ndarray) -> np.ndarray:
-    """I - J J+: what is left of whitened means when the free parameters were refitted, (means, means)."""
+    """Return I - J J+, which leaves the part of whitened means beyond a refit of the free parameters."""
     return np.eye(len(sensitivities)) - sensitivities @ np.linalg.pinv(sensitivities)
 
 
 @dataclass(frozen=True, eq=False)
 class Signatures:
-    """Mechanisms beside a fitted model, whitened by its covariance."""
+    """Signatures of mechanisms that a fitted model lacks, whitened by its covariance."""
 
     names: tuple[str, ...]
     whole: np.ndarray
     """Effect of a unit of coded size, (mechanisms, means)."""
     visible: np.ndarray
-    """Part that a refit leaves of it, (mechanisms, means)."""
+    """Part that a refit leaves, (mechanisms, means)."""
     turned_names: tuple[str, ...] = ()
     turned: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
-    """Mechanisms with a direction, and that part of them from behind, (directed mechanisms, means)."""
+    """Directed mechanisms, and that part of them from behind, (directed mechanisms, means)."""
 
     @property
     def directions(self) -> np.ndarray:
@@ -69,7 +67,7 @@ class Signatures:
 
     @property
     def turned_directions(self) -> np.ndarray:
-        """The same from behind, (directed mechanisms, means)."""
+        """Directions of the signatures from behind, (directed mechanisms, means)."""
         return _of_length_one(self.turned)
 
     @property
@@ -93,24 +91,18 @@ def _of_length_one(visible: np.ndarray) -> np.ndarray:
 
 
 def unshared(seen: Signatures, fitted: Fitted) -> Signatures:
-    """Signatures without what the bank's errors bring into them and into the residuals alike.
+    """Remove from signatures the errors of the bank that are in the residuals as well.
 
-    What a mechanism adds is emulated as a difference from the base, and the base's error is in that and in
-    the residuals: they seem to point at mechanisms where nothing is missing. What the residuals say of that
-    error is taken out of the visible parts; what is left is independent of them if nothing is missing.
-
-    Parameters
-    ----------
-    seen : Signatures
-        Of the mechanisms that are not in the model.
-    fitted : Fitted
-        A model that fresh runs have corrected hangs on them, no longer on the bank: nothing is taken out.
+    The addition of a mechanism is emulated as a difference from the base, and the base's error is in it and
+    in the residuals: they seem to point at mechanisms where nothing is missing. The estimate of that error
+    from the residuals is taken out of the visible parts; the rest is independent of the residuals if nothing
+    is missing. Nothing is taken out of a model that fresh runs have corrected.
     """
     if fitted.model.corrections or not seen.names:
         return seen
     project = projector(fitted.sensitivities)
-    told = fitted.whitening.T @ (project @ fitted.residuals)
-    shared = {name: _shared_errors(fitted, name) @ told for name in seen.names}
+    left = fitted.whitening.T @ (project @ fitted.residuals)
+    shared = {name: _shared_errors(fitted, name) @ left for name in seen.names}
     visible, turned = (
         part - np.array([shared[name] for name in names]).reshape(part.shape) @ fitted.whitening.T @ project
         for part, names in ((seen.visible, seen.names), (seen.turned, seen.turned_names))
@@ -119,7 +111,7 @@ def unshared(seen: Signatures, fitted: Fitted) -> Signatures:
 
 
 def _shared_errors(fitted: Fitted, name: str) -> np.ndarray:
-    """Covariance of errors of a signature with those of the residuals, (means, means)."""
+    """Return the covariance of errors of a signature with those of the residuals, (means, means)."""
     parts = []
     for block in fitted.stack.blocks:
         surfaces = fitted.model.emulator.surfaces[block.condition]
@@ -129,7 +121,7 @@ def _shared_errors(fitted: Fitted, name: str) -> np.ndarray:
 
 
 def signatures(fitted: Fitted) -> Signatures:
-    """Signatures of the mechanisms that are not in a fitted model."""
+    """Compute signatures of the mechanisms that are not in a fitted model."""
     emulator, blocks = fitted.model.emulator, fitted.stack.blocks
     names = tuple(name for name in emulator.space.names if name not in fitted.mechanisms)
     theta = fitted.x[: len(emulator.space.factors)]

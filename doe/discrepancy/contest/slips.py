@@ -1,11 +1,9 @@
-"""Slips: a gross misfit of one replicate, one kind of observable or one condition, which no effect makes.
+"""Slips: gross errors in one replicate, one kind of observable or one condition, which no effect makes.
 
-They are looked for before anything else, each left out in turn. A slip is only named where neither the base
-nor the base with one mechanism of the library takes most of the misfit up, and where one of them agrees with
-what is left: so a slip shows beside an effect, too.
+They are searched first, each left out in turn. A slip is only named where neither the base nor the base with
+one mechanism of the library takes most of the misfit up, and where one of them agrees with the rest: so a
+slip is found even where an effect is present.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,33 +14,33 @@ import numpy as np
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import gather
-from doe.discrepancy.fitting.model_fit import Fitted, fit, glimpse
+from doe.discrepancy.fitting.model_fit import Fitted, fit, quick_q
 from doe.discrepancy.problem.replicates import Measured
 from doe.discrepancy.problem.settings import Settings
 
 GROSS = 3.0
-"""Q over its degrees of freedom that is looked into."""
+"""Q over its degrees of freedom from which slips are searched."""
 FITS = 2.0
-"""Q over its degrees of freedom up to which a model may be right, as little as an emulator knows."""
+"""Q over its degrees of freedom up to which a model may be right."""
 HOPELESS = 4.0
-"""Q at a first look over that of a model that fits, from which on it is not fitted: of six mechanisms in four
-data sets the fit brought it to 0.4 of that at least."""
+"""Q of a quick fit over that of a model that fits, above which no full fit follows: full fits reached 0.4 of
+it."""
 OUTLYING = 8.0
-"""Standard deviations by which one value is an outlier that scatter never makes."""
+"""Standard deviations from which one value is an outlier that scatter never makes."""
 MANY = 3
-"""Outliers of one replicate from which on it is the replicate that is one."""
+"""Outliers of one replicate from which on the replicate is the outlier."""
 STRANGE = 4.0
-"""Standard deviations by which half of the values of a replicate is off where it is none of the others."""
+"""Standard deviations by which half of the values of an outlying replicate deviate."""
 LEAST = 4
-"""Replicates of which each is compared with the others."""
+"""Least number of replicates that are compared with one another."""
 MOST = 3
-"""Slips that are looked for one after the other."""
+"""Largest number of slips that are searched one after the other."""
 HELPS = 0.75
-"""Share of Q over its degrees of freedom that the largest of so many slips leaves at most: two thirds."""
+"""Largest share of Q over its degrees of freedom that a partial slip may leave."""
 FACTORS = (1000.0, 100.0, 60.0, 25.4, 10.0, 3.0, 2.0, -1.0)
-"""Factors of slips: of units, of an inch, of a digit, of a sign; their inverses as well."""
+"""Usual factors: of units, of an inch, of a digit, of a sign; their inverses as well."""
 NEAR = 0.15
-"""Relative distance from such a factor that is still it."""
+"""Relative distance up to which a factor is recognised."""
 
 
 @dataclass(frozen=True)
@@ -51,27 +49,28 @@ class Slip:
 
     observables: tuple[str, ...]
     conditions: tuple[str, ...]
-    """Its place; of a condition or a replicate all observables, of a kind of observable all conditions."""
+    """Place of the slip: all observables of a condition or replicate, or one kind of observable in all
+    conditions."""
     replicate: int | None
-    """Number of the one replicate, from 1; None where it is all."""
+    """Number of the replicate, from 1; None for all."""
     factor: float | None
-    """The values look as if multiplied by this; None where no usual factor does."""
+    """Factor by which the values seem multiplied; None where no usual factor fits."""
     exchanged: bool
-    """The two conditions look as if exchanged."""
+    """True if the two conditions seem exchanged."""
     q_with: float
     q_without: float
-    """Least Q of the base and the base with one mechanism, with these values and without them; of a value or
-    a replicate that differs from the others, its squared distance from them in standard deviations, and 0."""
+    """Least Q of the base and the base with one mechanism, with these values and without them; for an outlier
+    its squared distance from the others in standard deviations, and 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A slip that was tried, and what fits the rest best."""
+    """A tried slip, with the best fit to the rest."""
 
     slip: Slip
     rest: Fitted
     cost: int
-    """Number of values that would be wrong; an exchange is one error."""
+    """Number of values that would be wrong; an exchange counts as one."""
 
     @property
     def ratio(self) -> float:
@@ -91,10 +90,10 @@ def without(measured: Measured, slips: Sequence[Slip]) -> Measured:
 
 
 def find_slips(measured: Measured, emulator: Emulator, settings: Settings) -> tuple[Slip, ...]:
-    """Look for slips: of values and replicates first, then of one kind of observable, or of conditions.
+    """Find slips: single values and replicates first, then one kind of observable, or conditions.
 
-    Where no one slip leaves a rest that fits, two kinds are tried together, and then the one of a usual
-    factor that helps most is set aside and others are looked for. They are named if in the end one fits.
+    Where no single slip leaves a rest that fits, two kinds are tried together; then the slip of a usual
+    factor that helps most is set aside and the search continues. Slips are named if at last one fits.
     """
     outliers = _outliers(measured, emulator)
     rest, found = without(measured, outliers), outliers
@@ -118,7 +117,7 @@ def find_slips(measured: Measured, emulator: Emulator, settings: Settings) -> tu
 
 
 def _joined(found: Sequence[Slip], more: Sequence[Slip]) -> tuple[Slip, ...]:
-    """Join slips, less those whose values are all among those of a later one."""
+    """Join slips, without those whose values are all among those of a later one."""
     fields = ("observables", "conditions")
     held = [
         one
@@ -143,7 +142,7 @@ def _closest(measured: Measured, emulator: Emulator, settings: Settings) -> Fitt
         limit = FITS * max(len(stack.target) - len(stack.model.lower), 0)
         if best.q < FITS * best.freedom:
             break
-        if glimpse(stack, best.x[: len(base.model.lower)]) < HOPELESS * limit:
+        if quick_q(stack, best.x[: len(base.model.lower)]) < HOPELESS * limit:
             best = min(best, fit(stack, count=2), key=lambda one: one.q)
     return best
 
@@ -169,7 +168,7 @@ def _outliers(measured: Measured, emulator: Emulator) -> list[Slip]:
 
 
 def _from_the_others(measured: Measured, emulator: Emulator, condition: str) -> tuple[np.ndarray, np.ndarray]:
-    """Ratio of each value to the mean of the others, and its distance from it; NaN where unknown.
+    """Return the ratio of each value to the mean of the others, and its distance from it; NaN where unknown.
 
     A distance is in standard deviations, by the scatter of the others or of the model.
     """
@@ -190,7 +189,7 @@ def _from_the_others(measured: Measured, emulator: Emulator, condition: str) -> 
 
 
 def _usual(ratio: float) -> float | None:
-    """Find the usual factor that a ratio is near."""
+    """Return the usual factor that a ratio is near."""
     known = [one for factor in FACTORS for one in (factor, 1.0 / factor)]
     best = min(known, key=lambda factor: abs(ratio / factor - 1.0))
     return best if abs(ratio / best - 1.0) < NEAR else None
@@ -226,14 +225,14 @@ def _left_out(measured: Measured, emulator: Emulator, settings: Settings, whole:
 
 
 def _kinds(measured: Measured, emulator: Emulator) -> list[tuple[str, ...]]:
-    """Kinds of several observables of which the emulator knows one; it may lack others, as outlines."""
+    """Return kinds of several observables of which the emulator knows at least one."""
     return [kind for kind in measured.kinds if len(kind) > 1 and set(kind) & set(emulator.observables)]
 
 
 def _two_kinds(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> list[Slip]:
     """Find two kinds of observables that are both wrong by a usual factor.
 
-    The one does not show beside the other: what replicates scatter hides all.
+    One alone does not show: the scatter of the replicates hides it.
     """
     for pair in combinations(_kinds(measured, emulator), 2):
         slips = [Slip(kind, measured.conditions, None, None, False, whole.q, 0.0) for kind in pair]
@@ -246,7 +245,7 @@ def _two_kinds(measured: Measured, emulator: Emulator, settings: Settings, whole
 
 
 def _factor(measured: Measured, fitted: Fitted, slip: Slip) -> float | None:
-    """Find the usual factor between what was measured and what a fit to the rest predicts."""
+    """Find the usual factor between measured values and those predicted by a fit to the rest."""
     emulator, ratios = fitted.model.emulator, []
     for condition in (name for name in slip.conditions if name in emulator.surfaces):
         predicted = fitted.model.predict(fitted.x[None], condition)[0]

@@ -1,8 +1,8 @@
 """The bank: runs over factors and mechanisms in every condition, made once.
 
-Every data set is analysed from it. Points are Sobol points. Those without a mechanism are
-run more than once, so that the noise is known apart from what a polynomial cannot follow; those with one
-vary its size together with the factors.
+Every data set is analysed from it. Its points are Sobol points. Those without a mechanism are run more than
+once, so that the noise is known apart from the misfit of a polynomial; those with one vary its size together
+with the factors.
 """
 
 from __future__ import annotations
@@ -27,35 +27,26 @@ from doe.discrepancy.problem.space import MechanismRange, SearchSpace
 from doe.errors import RuleError
 
 LARGEST = 500_000_000
-"""Bytes of the arrays of the largest bank that is read."""
+"""Largest size of the arrays of a bank that is read [bytes]."""
 
 SURFACES = "base cubic, additions size times quadratic, rest squared exponential"
 """Form of the surfaces that kriged parts belong to."""
 
 _PARTS = ("space", "observables", "theta", "mechanism", "size", "condition", "values", "reasons")
-"""Arrays that every bank's file has."""
+"""Arrays of every bank's file."""
 
 
 def sobol_points(count: int, columns: int, seed: int) -> np.ndarray:
-    """First points of a scrambled Sobol sequence in the unit cube, (count, columns)."""
+    """Return the first points of a scrambled Sobol sequence in the unit cube, (count, columns)."""
     sampler = qmc.Sobol(columns, seed=np.random.default_rng(seed))
     return np.asarray(sampler.random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count])
 
 
 def bank_points(space: SearchSpace, settings: Settings, seed: int = 0) -> list[Point]:
-    """Cases of the library waves, in an order that never changes.
+    """Return the cases of a bank, in an order that never changes.
 
-    Parameters
-    ----------
-    space : SearchSpace
-    settings : Settings
-    seed : int
-        Seed of the points; the cases' own seeds follow from it.
-
-    Returns
-    -------
-    list of Point
-        (points x repeats + mechanisms x mechanism points) x conditions.
+    They are (points x repeats + mechanisms x mechanism points) x conditions. The cases' own seeds follow from
+    that of the points.
     """
     factors = len(space.factors)
     rows: list[tuple[np.ndarray, tuple[str, ...]]] = []
@@ -71,7 +62,7 @@ def bank_points(space: SearchSpace, settings: Settings, seed: int = 0) -> list[P
 
 @dataclass(frozen=True, eq=False)
 class Bank:
-    """Finished library waves as a table, one row a case."""
+    """Finished runs of a bank as a table, one row for each case."""
 
     space: SearchSpace
     observables: tuple[str, ...]
@@ -81,27 +72,27 @@ class Bank:
     mechanism: np.ndarray
     """Number of the mechanism in the space; -1 without one, (n,)."""
     coded_size: np.ndarray
-    """Its coded size; 0 without one, (n,)."""
+    """Coded size of the mechanism; 0 without one, (n,)."""
     condition: np.ndarray
     """Number of the condition, (n,)."""
     values: np.ndarray
-    """Natural units; NaN in rows that failed, (n, observables)."""
+    """Observables in natural units; NaN in rows that failed, (n, observables)."""
     reasons: np.ndarray
-    """Reason that a case failed, empty where it did not, (n,)."""
+    """Reason of each failed case, empty for the others, (n,)."""
     study: str = ""
-    """Fingerprint of what was simulated; empty where it is not known."""
+    """Fingerprint of the simulated study; empty if unknown."""
     maker: Mapping[str, str] = field(default_factory=dict)
-    """Maker of the runs, in the words of whoever ran them; empty where it is not known."""
+    """Description of the program that made the runs; empty if unknown."""
     kriged: KrigedParts | None = None
-    """Kriged parts of its emulator; None where it has not been fitted."""
+    """Kriged parts of its emulator; None before the first fit."""
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.theta), len(self.observables)):
-            rule = "needs a row a case and a column an observable"
+            rule = "must have a row per case and a column per observable"
             raise RuleError("Bank.values", rule, self.values.shape)
         self._check_columns()
         if not np.isfinite(self.values[self.finished]).all():
-            raise RuleError("Bank.values", "is finite wherever a case finished", "NaN")
+            raise RuleError("Bank.values", "must be finite wherever a case finished", "NaN")
 
     def _check_columns(self) -> None:
         rows = len(self.theta)
@@ -112,18 +103,18 @@ class Bank:
         }
         for name, shape in shapes.items():
             if (found := getattr(self, name).shape) != shape:
-                raise RuleError(f"Bank.{name}", f"has the shape {shape}", found)
+                raise RuleError(f"Bank.{name}", f"must have the shape {shape}", found)
         if rows == 0:
-            raise RuleError("Bank.values", "has at least one case", "none")
+            raise RuleError("Bank.values", "must have at least one case", "no case")
         ranges = {"mechanism": (-1, len(space.names)), "condition": (0, len(space.conditions))}
         for name, (least, end) in ranges.items():
             numbers = getattr(self, name)
             if numbers.dtype.kind not in "iu" or not (least <= numbers.min() <= numbers.max() < end):
-                raise RuleError(f"Bank.{name}", f"numbers from {least} to {end - 1}", numbers.dtype)
+                raise RuleError(f"Bank.{name}", f"must be integers from {least} to {end - 1}", numbers.dtype)
         if not (np.isfinite(self.theta).all() and np.isfinite(self.coded_size).all()):
-            raise RuleError("Bank.theta, Bank.coded_size", "is finite", "NaN")
+            raise RuleError("Bank.theta, Bank.coded_size", "must be finite", "NaN")
         if self.reasons.dtype.kind != "U":
-            raise RuleError("Bank.reasons", "is text", self.reasons.dtype)
+            raise RuleError("Bank.reasons", "must be text", self.reasons.dtype)
 
     @cached_property
     def finished(self) -> np.ndarray:
@@ -132,7 +123,7 @@ class Bank:
 
     @cached_property
     def runs_sha256(self) -> str:
-        """Hash of all that an emulator is fitted to, values as a file keeps them."""
+        """Hash of the data of an emulator, values as a file keeps them."""
         odd = [name in self.space.odd for name in self.observables]
         directed = [one.directed for one in self.space.mechanisms]
         text = json.dumps([SURFACES, len(self.space.conditions), odd, directed])
@@ -143,15 +134,15 @@ class Bank:
 
     @property
     def known_parts(self) -> KrigedParts | None:
-        """Kriged parts that were found from these runs; None: the runs are others since, or never fitted."""
+        """Kriged parts that were found from these runs; None if the runs changed, or before the first fit."""
         return self.kriged if self.kriged and self.kriged.runs == self.runs_sha256 else None
 
     def rows(self, condition: int, mechanism: int) -> np.ndarray:
-        """Numbers of the finished cases of a condition with a mechanism (-1: without)."""
+        """Return the numbers of the finished cases of a condition with a mechanism (-1: without)."""
         return np.flatnonzero(self.finished & (self.condition == condition) & (self.mechanism == mechanism))
 
     def renamed(self, names: Mapping[str, str]) -> Bank:
-        """Return the same bank with mechanisms of other names, by their names here."""
+        """Return the same bank with mechanisms renamed, by their names here."""
         mechanisms = tuple(replace(one, name=names.get(one.name, one.name)) for one in self.space.mechanisms)
         return replace(self, space=replace(self.space, mechanisms=mechanisms))
 
@@ -186,13 +177,7 @@ class Bank:
 
 
 def load_bank(path: Path) -> Bank:
-    """Read a bank that `Bank.save` wrote.
-
-    Raises
-    ------
-    RuleError
-        When the file is no bank.
-    """
+    """Read a bank that `Bank.save` wrote; raise RuleError for any other file."""
     try:
         columns = _read_columns(path)
         if missing := [name for name in _PARTS if name not in columns]:
@@ -209,14 +194,14 @@ def load_bank(path: Path) -> Bank:
         kriged = KrigedParts.from_table(runs, table) if runs else None
         return Bank(space, names, **columns, study=made_for, maker=made_by, kriged=kriged)
     except Exception as error:
-        # the libraries raise whatever their parsers happen to meet in a damaged file
+        # the libraries raise errors of many kinds for a damaged file
         raise RuleError(str(path), "must be a bank that this program wrote", str(error)) from error
 
 
 def _read_columns(path: Path) -> dict[str, Any]:
-    """Arrays of a file by name, no more than a bank can have, their checksums verified."""
+    """Return the arrays of a file by name, of at most the size of a bank, with their checksums verified."""
     if not path.is_file():
-        raise ValueError("no regular file")
+        raise ValueError("it is not a regular file")
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
         # a damaged directory may end early, which zipfile does not notice
@@ -224,7 +209,7 @@ def _read_columns(path: Path) -> dict[str, Any]:
             raise ValueError("its directory has another number of arrays than it states")
         if (size := sum(member.file_size for member in members)) > LARGEST:
             raise ValueError(f"arrays of {size:,} bytes, at most {LARGEST:,}")
-        # whole, so that its checksum is looked at
+        # whole, so that its checksum is verified
         content = {member.filename.removesuffix(".npy"): archive.read(member) for member in members}
     return {name: np.load(io.BytesIO(array), allow_pickle=False) for name, array in content.items()}
 
@@ -237,15 +222,15 @@ def make_bank(
     study: str = "",
     maker: Mapping[str, str] | None = None,
 ) -> Bank:
-    """Table of finished library waves.
+    """Return the bank of finished runs.
 
     Raises
     ------
     RuleError
-        For a point with two mechanisms: a bank knows none or one at a time.
+        A point with two mechanisms.
     """
     if any(len(point.sizes) > 1 for point in points):
-        raise RuleError("points of a bank", "has at most one mechanism in a case", "two")
+        raise RuleError("points of a bank", "must have at most one mechanism each", "two")
     names = space.names
     sizes = [point.sizes[0] if point.sizes else None for point in points]
     coded = [0.0 if entry is None else space.coded_size(*entry) for entry in sizes]

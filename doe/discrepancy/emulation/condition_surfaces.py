@@ -1,13 +1,13 @@
-"""Response surfaces of one condition: the base model's over the factors, and what each mechanism adds.
+"""Response surfaces of one condition: the base model over the factors, and the addition of each mechanism.
 
-The base is a full cubic of the factors. A mechanism of coded size g adds g times a full quadratic of g
-and the factors, nothing at g = 0. What a polynomial misses may be kriged. `surface_fits` fits them.
+The base is a full cubic of the factors. A mechanism of coded size g adds g times a full quadratic of g and
+the factors, nothing at g = 0. The misfit of a polynomial may be kriged. `surface_fits` fits them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations_with_replacement
 
@@ -19,29 +19,29 @@ from doe.numerics.kriging import Kriging
 
 @cache
 def _products(size: int, degree: int) -> np.ndarray:
-    """Numbers of the factors in each product of a degree, (degree, products)."""
+    """Return the numbers of the factors in each product of a degree, (degree, products)."""
     return np.array([*combinations_with_replacement(range(size), degree)], dtype=int).reshape(-1, degree).T
 
 
 def quadratic(theta: np.ndarray) -> np.ndarray:
-    """Terms of a full quadratic: 1, factors, squares and products, (n, terms)."""
+    """Return the terms of a full quadratic: 1, factors, squares and products, (n, terms)."""
     i, j = _products(theta.shape[1], 2)
     return np.concatenate([np.ones((len(theta), 1)), theta, theta[:, i] * theta[:, j]], axis=1)
 
 
 def cubic(theta: np.ndarray) -> np.ndarray:
-    """Terms of a full cubic: those of the quadratic, then products of three factors, (n, terms)."""
+    """Return the terms of a full cubic: those of the quadratic, then products of three factors."""
     i, j, k = _products(theta.shape[1], 3)
     return np.concatenate([quadratic(theta), theta[:, i] * theta[:, j] * theta[:, k]], axis=1)
 
 
 def added(theta: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Terms of what a mechanism adds: its size times a full quadratic of size and factors, (n, terms)."""
+    """Return the terms of a mechanism's addition: its size times a full quadratic of size and factors."""
     return np.asarray(size[:, None] * quadratic(np.concatenate([size[:, None], theta], axis=1)))
 
 
 def all_terms(x: np.ndarray, factors: int) -> np.ndarray:
-    """Terms of the base, then of every mechanism, at coded parameters (n, parameters), (n, terms)."""
+    """Return the terms of the base, then of every mechanism, at coded parameters (n, parameters)."""
     theta = x[:, :factors]
     return np.concatenate([cubic(theta), *(added(theta, size) for size in x[:, factors:].T)], axis=1)
 
@@ -53,54 +53,55 @@ class Polynomial:
     coefficients: np.ndarray
     """(terms, observables)."""
     misfit: np.ndarray
-    """Variance of what neither the noise nor the kriging accounts for, (observables,)."""
+    """Variance beyond the noise and the kriging, (observables,)."""
     kriging: Mapping[int, Kriging]
-    """By number of the observable: what the polynomial misses, where it fails."""
+    """Kriged misfit by number of the observable, where the polynomial fails."""
 
     def missed(self, x: np.ndarray) -> np.ndarray:
-        """Kriged part at coded parameters, (n, observables)."""
+        """Return the kriged part at coded parameters, (n, observables)."""
         out = np.zeros((len(x), len(self.misfit)))
         for column, kriging in self.kriging.items():
             out[:, column] = kriging.mean(x)
         return out
 
     def misfit_variance(self, x: np.ndarray) -> np.ndarray:
-        """Variance of what is missed at one row of coded parameters, (observables,)."""
+        """Return the variance of the misfit at one row of coded parameters, (observables,)."""
         out = self.misfit.copy()
         for column, kriging in self.kriging.items():
             out[column] = kriging.variance(x[None])[0]
         return out
 
     def silenced(self, silent: np.ndarray) -> Polynomial:
-        """Return the same without what symmetry forbids."""
+        """Return the same without the observables that symmetry forbids."""
         kriging = {column: one for column, one in self.kriging.items() if not silent[column]}
         return Polynomial(self.coefficients * ~silent, self.misfit * ~silent, kriging)
 
 
 @dataclass(frozen=True, eq=False)
 class Addition:
-    """A mechanism's addition to the base, with how its error hangs on that of the base."""
+    """A mechanism's addition to the base, with the relation of its error to that of the base."""
 
     polynomial: Polynomial
     base_terms: np.ndarray
-    """Errors of the base's coefficients come through as minus this matrix times them, (terms, base terms)."""
+    """Minus the matrix from errors of the base's coefficients to those of the addition, (terms, base terms).
+    """
     gram_inverse: np.ndarray
     """(terms, terms)."""
     chance: np.ndarray
-    """Covariance that the noise of the runs gives the coefficients, in variances of one run: that of their
-    error, ``gram_inverse``, less what drawing them towards nothing leaves open, (terms, terms)."""
+    """Covariance of the coefficients due to the noise of the runs, in variances of one run, (terms, terms):
+    that of their error, ``gram_inverse``, less the part that shrinking them leaves open."""
     growth: np.ndarray
     """Logarithm of the variance of one run at the largest size over that without the mechanism,
     (observables,)."""
     variance: np.ndarray
-    """Of one run, mean over the mechanism's runs, (observables,)."""
+    """Variance of one run, mean over the mechanism's runs, (observables,)."""
     correlation: np.ndarray
-    """Of one run at the largest size, (observables, observables)."""
+    """Correlation of one run at the largest size, (observables, observables)."""
     silent: np.ndarray
-    """True where symmetry forbids that it acts, (observables,)."""
+    """True where symmetry forbids an effect, (observables,)."""
 
     def predict(self, theta: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """Predict what is added at coded factors (n, factors) and sizes (n,), (n, observables)."""
+        """Predict the addition at coded factors (n, factors) and sizes (n,), (n, observables)."""
         values = added(theta, size) @ self.polynomial.coefficients
         if self.polynomial.kriging:
             values += size[:, None] * self.polynomial.missed(np.column_stack([theta, size]))
@@ -108,7 +109,7 @@ class Addition:
 
     @property
     def covariance(self) -> np.ndarray:
-        """Covariance of one run where it may act, mean over its runs, (observables, observables)."""
+        """Covariance of one run where an effect is allowed, mean over its runs."""
         sd = np.sqrt(self.variance) * ~self.silent
         return np.asarray(sd[:, None] * self.correlation * sd)
 
@@ -120,16 +121,16 @@ class Surfaces:
     base: Polynomial
     gram_inverse: np.ndarray
     chance: np.ndarray
-    """Of the base's fit, as of an `Addition`, (terms, terms)."""
+    """Matrices of the base's fit, as in an `Addition`, (terms, terms)."""
     noise: Noise
-    """Of one run near the base."""
+    """Noise of one run near the base."""
     additions: Mapping[str, Addition]
-    """By mechanism."""
+    """Additions by mechanism."""
     silent: np.ndarray
-    """True where symmetry forbids that the base is anything but noise, (observables,)."""
+    """True where symmetry leaves the base noise only, (observables,)."""
 
     def predict(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
-        """Expected observables at coded parameters (n, factors + mechanisms), (n, observables).
+        """Return expected observables at coded parameters (n, factors + mechanisms), (n, observables).
 
         Mechanisms add up.
         """
@@ -140,7 +141,7 @@ class Surfaces:
         return np.asarray(values)
 
     def noise_covariance(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
-        """Covariance of one run at one row of coded parameters, (observables, observables)."""
+        """Return the covariance of one run at one row of coded parameters, (observables, observables)."""
         theta = x[: len(x) - len(mechanisms)]
         growth = np.zeros(len(self.base.misfit))
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
@@ -149,9 +150,9 @@ class Surfaces:
         return np.asarray(sd[:, None] * self.correlation(x, mechanisms) * sd)
 
     def correlation(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
-        """Correlation of one run at one row of coded parameters, (observables, observables).
+        """Return the correlation of one run at one row of coded parameters, (observables, observables).
 
-        A mechanism's own counts as much as its size is of the largest.
+        A mechanism's own counts by its share of the largest size.
         """
         sizes = x[len(x) - len(mechanisms) :]
         whole = max(float(sizes.sum()), 1.0)
@@ -161,7 +162,7 @@ class Surfaces:
         return np.asarray(out)
 
     def error(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
-        """Covariance of the prediction's error at one row of coded parameters, (observables, observables)."""
+        """Return the covariance of the prediction's error at one row of coded parameters."""
         theta = x[: len(x) - len(mechanisms)]
         base, own = self._base_terms(x, mechanisms), np.diag(self.misfit_variance(x, mechanisms))
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
@@ -171,23 +172,10 @@ class Surfaces:
         return np.asarray((base @ self.gram_inverse @ base) * self._base_noise(theta) + own)
 
     def shared_error(self, x: np.ndarray, mechanisms: tuple[str, ...], name: str, size: float) -> np.ndarray:
-        """Covariance of errors of what another mechanism adds and of measured less predicted.
+        """Return the covariance of errors of another mechanism's addition and of measured less predicted.
 
-        Both have the base's in them: the one as it was fitted to runs less the base.
-
-        Parameters
-        ----------
-        x : (parameters,) array
-            Coded, of the mechanisms that are in the prediction.
-        mechanisms : tuple of str
-        name : str
-            The other one.
-        size : float
-            Its coded size.
-
-        Returns
-        -------
-        (observables, observables) array
+        Both contain the error of the base: the addition was fitted to runs less the base. x (parameters,) is
+        coded, of the mechanisms in the prediction; ``name`` and its coded ``size`` are the other one's.
         """
         theta = x[: len(x) - len(mechanisms)]
         through = added(theta[None], np.array([size]))[0] @ self.additions[name].base_terms
@@ -196,7 +184,7 @@ class Surfaces:
         )
 
     def _base_terms(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
-        """Terms by which errors of the base's coefficients come into a prediction, (terms,)."""
+        """Return the terms by which errors of the base's coefficients enter a prediction, (terms,)."""
         theta = x[: len(x) - len(mechanisms)]
         terms = cubic(theta[None])[0]
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
@@ -204,26 +192,26 @@ class Surfaces:
         return np.asarray(terms)
 
     def _base_noise(self, theta: np.ndarray) -> np.ndarray:
-        """Covariance of one run where the base is more than noise, (observables, observables)."""
+        """Return the covariance of one run where the base is more than noise, (observables, observables)."""
         return np.asarray(self.noise.covariance(theta) * np.outer(~self.silent, ~self.silent))
 
     def coefficient_errors(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
-        """Covariances of errors of all coefficients, of noise as at some factors (observables, terms, terms).
+        """Return covariances of errors of all coefficients, with the noise at some factors.
 
-        Terms are those of `all_terms`.
+        Shape (observables, terms, terms), with the terms of `all_terms`.
         """
         own = [self.additions[name].gram_inverse for name in mechanisms]
         return self._of_coefficients(theta, mechanisms, self.gram_inverse, own)
 
     def coefficient_chance(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
-        """Covariances that noise gives all coefficients, as `coefficient_errors` has them of their errors."""
+        """Return covariances of all coefficients due to noise (`coefficient_errors`)."""
         own = [self.additions[name].chance for name in mechanisms]
         return self._of_coefficients(theta, mechanisms, self.chance, own)
 
     def _of_coefficients(
         self, theta: np.ndarray, mechanisms: tuple[str, ...], base: np.ndarray, own: Sequence[np.ndarray]
     ) -> np.ndarray:
-        """Covariances of all coefficients, of those of the base and of each mechanism's own."""
+        """Return covariances of all coefficients from those of the base and of each mechanism's own."""
         parts = [self.additions[name] for name in mechanisms]
         shared = np.concatenate([np.eye(len(base)), *(-part.base_terms for part in parts)])
         variance = (self.noise.variance(theta) * ~self.silent)[:, None, None]
@@ -236,14 +224,34 @@ class Surfaces:
         return np.asarray(whole)
 
     def moved(self, mechanisms: tuple[str, ...]) -> np.ndarray:
-        """True where a model with some mechanisms is more than noise, (observables,)."""
+        """Return True where a model with some mechanisms is more than noise, (observables,)."""
         return ~np.logical_and.reduce([self.silent, *(self.additions[name].silent for name in mechanisms)])
 
     def misfit_variance(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
-        """Variance of what no coefficient follows at one row of coded parameters, (observables,)."""
+        """Return the variance beyond all coefficients at one row of coded parameters, (observables,)."""
         theta = x[: len(x) - len(mechanisms)]
         misfit = self.base.misfit_variance(theta)
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
             at = np.append(theta, size)
             misfit = misfit + size**2 * self.additions[name].polynomial.misfit_variance(at)
         return np.asarray(misfit)
+
+
+def symmetric_base(base: Surfaces, odd: np.ndarray) -> Surfaces:
+    """Remove from a base the observables that a mirror turns over, (observables,).
+
+    Their scatter is that of its runs; a mirror turns over their correlation with the others, so it is zero.
+    """
+    noise = replace(base.noise, correlation=_parted(base.noise.correlation, odd))
+    return replace(base, base=base.base.silenced(odd), noise=noise, silent=odd)
+
+
+def symmetric_addition(addition: Addition, odd: np.ndarray, silent: np.ndarray) -> Addition:
+    """Remove from a mechanism the observables that symmetry forbids; nothing from a directed one."""
+    polynomial = addition.polynomial.silenced(silent)
+    correlation = _parted(addition.correlation, odd) if silent.any() else addition.correlation
+    return replace(addition, polynomial=polynomial, correlation=correlation, silent=silent)
+
+
+def _parted(correlation: np.ndarray, odd: np.ndarray) -> np.ndarray:
+    return np.where(odd[:, None] == odd, correlation, 0.0)

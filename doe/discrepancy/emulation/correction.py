@@ -1,10 +1,9 @@
-"""Corrections of the emulator by fresh runs: its coefficients anew, and what no coefficients follow.
+"""Corrections of the emulator by fresh runs: updated coefficients, and a smooth rest.
 
-The emulator is the mean of what its bank leaves open, and its stated error the covariance. Fresh runs narrow
-that down as more runs of the bank would; besides, they show a smooth function that the polynomials lack.
+The emulator is the mean of the functions that its bank allows, and its stated error their covariance. Fresh
+runs narrow them down as more runs of the bank would; they also show a smooth function that the polynomials
+lack.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -19,18 +18,18 @@ class Prior:
     """Knowledge of the emulator's error in one condition before fresh runs."""
 
     factors: int
-    """Number of the factors; the other parameters are sizes."""
+    """Number of factors; the other parameters are sizes."""
     coefficients: np.ndarray
     """Covariances of the errors of the coefficients, (observables, terms, terms)."""
     chance: np.ndarray
-    """Covariances that the noise of the bank gives them, (observables, terms, terms)."""
+    """Covariances of the coefficients' errors due to the noise of the bank, (observables, terms, terms)."""
     amplitude: np.ndarray
     """Variances of the smooth function, (observables,)."""
     length: np.ndarray
-    """Over which it changes, in coded units, (parameters,)."""
+    """Lengths of the smooth function, in coded units, (parameters,)."""
 
     def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Covariance of errors at coded (m, parameters) and (n, parameters), (observables, m, n)."""
+        """Return the covariance of errors between two sets of coded points, (observables, m, n)."""
         terms = all_terms(a, self.factors), all_terms(b, self.factors)
         smooth = squared_exponential(a / self.length, b / self.length)
         return np.asarray(terms[0] @ self.coefficients @ terms[1].T + self.amplitude[:, None, None] * smooth)
@@ -42,57 +41,40 @@ class Correction:
 
     prior: Prior
     points: np.ndarray
-    """Of the runs, coded, (n, parameters)."""
+    """Coded points of the runs, (n, parameters)."""
     coefficients: np.ndarray
-    """Addition to the emulator's, (terms, observables)."""
+    """Additions to the emulator's coefficients, (terms, observables)."""
     weights: np.ndarray
-    """Of the smooth function, (n, observables)."""
+    """Weights of the smooth function, (n, observables)."""
     inverse: np.ndarray
     """Inverse covariances of the runs, (observables, n, n)."""
     correlation: np.ndarray
-    """Of errors, (observables, observables)."""
+    """Correlation of errors, (observables, observables)."""
     noise: np.ndarray
     """Variances of the noise of the runs' means, (n, observables)."""
     noise_ratio: np.ndarray
     """Standard deviations of one run around the optimum over those of the emulator, (observables,)."""
 
     def mean(self, x: np.ndarray) -> np.ndarray:
-        """Addition to the emulator, (n, observables)."""
+        """Return the addition to the emulator, (n, observables)."""
         smooth = squared_exponential(x / self.prior.length, self.points / self.prior.length)
         return np.asarray(all_terms(x, self.prior.factors) @ self.coefficients + smooth @ self.weights)
 
     def gain(self, x: np.ndarray) -> np.ndarray:
-        """Change of the addition by what the emulator misses at each point of the runs.
-
-        Parameters
-        ----------
-        x : (m, parameters) array
-            Coded.
-
-        Returns
-        -------
-        (observables, m, n) array
-        """
+        """Return the change of the addition at coded points per miss at each run, (observables, m, n)."""
         return np.asarray(self.prior.covariance(x, self.points) @ self.inverse)
 
     def error(self, x: np.ndarray) -> np.ndarray:
-        """Covariance of the corrected prediction's error at one row of coded parameters."""
+        """Return the covariance of the corrected prediction's error at one row of coded parameters."""
         known = self.prior.covariance(self.points, x[None])
         left = self.prior.covariance(x[None], x[None]) - self.gain(x[None]) @ known
         sd = np.sqrt(np.maximum(left[:, 0, 0], 0.0))
         return np.asarray(sd[:, None] * self.correlation * sd)
 
     def chance(self, x: np.ndarray) -> np.ndarray:
-        """Covariances that the noise of all runs, the bank's too, gives corrected predictions.
+        """Return covariances of corrected predictions due to the noise of all runs, (observables, n, n).
 
-        Parameters
-        ----------
-        x : (n, parameters) array
-            Coded.
-
-        Returns
-        -------
-        (observables, n, n) array
+        The noise of the bank is included; x is coded (n, parameters).
         """
         prior, gain = self.prior, self.gain(x)
         of_bank = all_terms(x, prior.factors) - gain @ all_terms(self.points, prior.factors)
@@ -110,20 +92,7 @@ def condition_on(
     correlation: np.ndarray,
     noise_ratio: np.ndarray,
 ) -> Correction:
-    """Learn from what the emulator missed.
-
-    Parameters
-    ----------
-    prior : Prior
-    points : (n, parameters) array
-        Coded.
-    missed : (n, observables) array
-        Simulated less emulated means.
-    noise : (n, observables) array
-        Variances of the means' noise.
-    correlation : (observables, observables) array
-    noise_ratio : (observables,) array
-    """
+    """Update a prior by missed means (n, observables) at coded points, with the noise of each."""
     covariance = prior.covariance(points, points) + noise.T[:, :, None] * np.eye(len(points))
     inverse = np.linalg.inv(covariance)
     weights = np.einsum("jmn,nj->mj", inverse, missed)
@@ -134,7 +103,7 @@ def condition_on(
 
 
 def log_likelihood(prior: Prior, points: np.ndarray, missed: np.ndarray, noise: np.ndarray) -> float:
-    """Of what the emulator missed, all observables together, but for a constant; see `condition_on`."""
+    """Return the log-likelihood of the misses of all observables, but for a constant."""
     covariance = prior.covariance(points, points) + noise.T[:, :, None] * np.eye(len(points))
     triangle = np.linalg.cholesky(covariance)
     white = np.linalg.solve(triangle, missed.T[:, :, None])

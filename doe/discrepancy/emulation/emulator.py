@@ -1,4 +1,4 @@
-"""The emulator: the bank's runs as smooth surfaces, so that a model can be fitted in no time."""
+"""The emulator: the bank's runs as smooth surfaces, to which a model is fitted quickly."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from doe.discrepancy.emulation.bank import Bank
-from doe.discrepancy.emulation.condition_surfaces import Addition, Surfaces
+from doe.discrepancy.emulation.condition_surfaces import (
+    Addition,
+    Surfaces,
+    symmetric_addition,
+    symmetric_base,
+)
 from doe.discrepancy.emulation.kriged_parts import BASE, KrigedParts
 from doe.discrepancy.emulation.run_noise import fit_noises
 from doe.discrepancy.emulation.surface_fits import (
@@ -18,34 +23,33 @@ from doe.discrepancy.emulation.surface_fits import (
     fit_bases,
     repeats_of,
 )
-from doe.discrepancy.emulation.symmetry import symmetric_addition, symmetric_base
 from doe.discrepancy.problem.space import SearchSpace
 from doe.errors import RuleError
 from doe.numerics.one_thread import in_one_thread
 
 LEAST_RUNS = 10
-"""Of a mechanism, in every condition."""
+"""Least number of runs of a mechanism in every condition."""
 RESOLUTION = 1e-3
 """Least standard deviation of an observable, as a share of its range over the whole bank."""
 
 
 @dataclass(frozen=True, eq=False)
 class Emulator:
-    """Surfaces of every condition."""
+    """Surfaces of all conditions."""
 
     space: SearchSpace
     observables: tuple[str, ...]
     """Columns of every prediction; those that never vary in the bank are left out."""
     surfaces: Mapping[str, Surfaces]
-    """By condition."""
+    """Surfaces by condition."""
     columns: tuple[int, ...]
-    """Their columns in the outcomes of the simulator."""
+    """Columns of the observables in the outcomes of the simulator."""
     cases: int
-    """Cases of the bank."""
+    """Number of cases of the bank."""
     notes: tuple[str, ...] = ()
-    """Remarks on what was left out of the bank, and why."""
+    """Remarks on parts of the bank that were left out, with reasons."""
     kriged: KrigedParts | None = None
-    """Covariances of its kriged parts, also of those that symmetry took out; None where there is no bank."""
+    """Covariances of its kriged parts, also of those that symmetry took out; None without a bank."""
 
     def without(self, *mechanisms: str) -> Emulator:
         """Return the same emulator with some mechanisms withheld from the library."""
@@ -53,28 +57,28 @@ class Emulator:
 
 
 def fitted(bank: Bank) -> Bank:
-    """Return the same bank with what takes the longest of its fit, so that nobody need find it again.
+    """Return the same bank with the kriged parts of its fit, which take longest to find.
 
     Raises
     ------
     RuleError
-        When it cannot be fitted, as of `fit_emulator`.
+        It cannot be fitted (`fit_emulator`).
     """
     return replace(bank, kriged=fit_emulator(bank).kriged)
 
 
 @in_one_thread
 def fit_emulator(bank: Bank) -> Emulator:
-    """Fit every surface to a bank; parts that it says are kriged are not searched for.
+    """Fit every surface to a bank; its known kriged parts are not searched again.
 
     Raises
     ------
     RuleError
-        When a condition has too few finished runs.
+        A condition has too few finished runs.
     """
     finished = bank.values[bank.finished]
     if not len(finished):
-        raise RuleError("bank", "needs finished cases", "none")
+        raise RuleError("bank", "must have finished cases", "no finished case")
     spread = np.ptp(finished, axis=0)
     columns = np.flatnonzero(spread > 0.0)
     notes = [
@@ -121,7 +125,7 @@ def fit_emulator(bank: Bank) -> Emulator:
 
 
 def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray, known: KrigedParts | None) -> list[Surfaces]:
-    """Surfaces of every condition without mechanisms."""
+    """Return the surfaces of every condition without mechanisms."""
     data = []
     for number, condition in enumerate(bank.space.conditions):
         rows = bank.rows(number, -1)
@@ -140,7 +144,7 @@ def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray, known: KrigedPart
 
 
 def _too_few(bank: Bank) -> list[str]:
-    """Mechanisms with too few runs in some condition."""
+    """Return mechanisms with too few runs in some condition."""
     conditions = range(len(bank.space.conditions))
     return [
         name

@@ -1,6 +1,6 @@
-"""Parts of an emulator that are kriged, as a fit chose them: kept with its bank, nobody need search again.
+"""Kriged parts of an emulator as a fit chose them, kept with its bank.
 
-The search for lengths takes nearly all of a fit, and rounding may decide whether a polynomial fails.
+The search for lengths takes nearly all of a fit, and rounding may decide if a polynomial fails.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from doe.errors import RuleError
 from doe.numerics.kriging import Covariance, Kriging, fit_kriging, krige
 
 BETTER = 0.97
-"""Kriging is kept where it lowers the mean square of what is left out to less than this."""
+"""Ratio of mean squares of leave-one-out errors below which kriging is kept."""
 BASE = -1
-"""Number that stands for no mechanism."""
+"""Number that means no mechanism."""
 _PLACE = 3
-"""Columns of a table that say which part a row is."""
+"""Columns of a table that identify the part in a row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,8 @@ class KrigedParts:
     runs: str
     """Hash of the runs that they were found from (`Bank.runs_sha256`)."""
     covariances: Mapping[tuple[int, int], Mapping[int, Covariance]]
-    """By numbers of condition and mechanism (`BASE`: without one), then by column of the emulator."""
+    """Covariances by numbers of condition and mechanism (`BASE`: without one), then by column of the
+    emulator."""
 
     @classmethod
     def of(cls, runs: str, kriging: Mapping[tuple[int, int], Mapping[int, Kriging]]) -> KrigedParts:
@@ -37,7 +38,7 @@ class KrigedParts:
         return cls(runs, parts)
 
     def of_surface(self, condition: int, mechanism: int) -> Mapping[int, Covariance]:
-        """Covariances of one surface by column."""
+        """Return the covariances of one surface by column."""
         return self.covariances.get((condition, mechanism), {})
 
     def table(self) -> np.ndarray:
@@ -53,22 +54,19 @@ class KrigedParts:
 
     @classmethod
     def from_table(cls, runs: str, table: np.ndarray) -> KrigedParts:
-        """Read what `table` returned.
+        """Read the table that `table` returned.
 
-        Raises
-        ------
-        RuleError
-            When a place is no whole number, or an amplitude or a length is not positive.
+        Raises RuleError: a place that is no whole number, or an amplitude or a length that is not positive.
         """
         if table.ndim != 2 or table.shape[1] <= _PLACE or table.dtype.kind != "f":
-            raise RuleError("Bank.kriged", "is a table of numbers, a row for each part", table.shape)
+            raise RuleError("Bank.kriged", "must be a table of numbers, a row for each part", table.shape)
         parts: dict[tuple[int, int], dict[int, Covariance]] = {}
         for row in table:
             scales = row[_PLACE:][~np.isnan(row[_PLACE:])]
             if not (np.isfinite(scales).all() and (scales > 0.0).all() and len(scales) > 1):
-                raise RuleError("Bank.kriged", "has positive amplitudes and lengths", row)
+                raise RuleError("Bank.kriged", "must have positive amplitudes and lengths", row)
             if not (row[:_PLACE] == np.round(row[:_PLACE])).all() or row[:_PLACE].min() < BASE or row[2] < 0:
-                raise RuleError("Bank.kriged", "numbers its parts by whole numbers", row)
+                raise RuleError("Bank.kriged", "must number its parts by whole numbers", row)
             condition, mechanism, column = (int(number) for number in row[:_PLACE])
             parts.setdefault((condition, mechanism), {})[column] = Covariance(float(scales[0]), scales[1:])
         return cls(runs, parts)
@@ -76,18 +74,18 @@ class KrigedParts:
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """Part of some runs that polynomials miss, all columns alike (n, observables)."""
+    """Part of some runs that polynomials miss, in columns (n, observables)."""
 
     points: np.ndarray
-    """(n, parameters)."""
+    """Coded points, (n, parameters)."""
     missed: np.ndarray
     noise: np.ndarray
-    """Variances."""
+    """Missed values, and variances of their noise."""
     weights: np.ndarray
-    """Of the squares that are compared where a run is left out."""
+    """Weights of the squares that are compared where a run is left out."""
 
     def kriged(self, suspects: np.ndarray, known: Mapping[int, Covariance] | None) -> dict[int, Kriging]:
-        """Krige the columns that are known, or the suspects, and keep those of these that are the better."""
+        """Krige the known columns, or the suspect ones, and keep those of these that improve."""
         if known is not None:
             return {column: self._as_known(column, covariance) for column, covariance in known.items()}
         columns = np.flatnonzero(suspects).tolist()
@@ -96,12 +94,12 @@ class Rest:
 
     def _as_known(self, column: int, covariance: Covariance) -> Kriging:
         if column >= self.missed.shape[1] or len(covariance.length) != self.points.shape[1]:
-            rule = "needs kriged parts of its own columns and factors"
+            rule = "must have kriged parts of its own columns and factors"
             raise RuleError("Bank.kriged", rule, f"column {column}, {len(covariance.length)} lengths")
         try:
             return krige(*self._data(column), covariance)
         except (np.linalg.LinAlgError, ValueError) as error:
-            rule = "needs kriged parts whose covariance can be inverted"
+            rule = "must have kriged parts whose covariance can be inverted"
             raise RuleError("Bank.kriged", rule, f"an amplitude of {covariance.amplitude:g}") from error
 
     def _data(self, column: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,10 +1,8 @@
-"""The scatter of runs from seed to seed: a covariance over the factors, from repeated runs.
+"""Scatter of runs from seed to seed: a covariance over the factors, from repeated runs.
 
-Variances vary over the factors, so each observable's is the exponential of a plane. Planes and correlations
-of the conditions are alike as far as the repeats say so, each condition's own being known from a few.
+Variances vary over the factors: each observable's is the exponential of a plane. The repeats determine how
+alike planes and correlations of the conditions are, since a single condition has few repeats.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,17 +12,17 @@ import numpy as np
 SLOPE_SD = 0.7
 """Prior standard deviation of the slopes of a log-variance over half a range: a factor of two either way."""
 FIRST_APART = 0.3
-"""Standard deviation of a condition's coefficient about that of all, before the repeats have said it."""
+"""Standard deviation of a condition's coefficient about the common one, before the repeats are used."""
 LEAST_APART = 0.01
-"""Least one: smaller ones are nothing."""
+"""Least such standard deviation."""
 CORRELATION_SHRINKAGE = 0.02
 """Share of the identity in a correlation matrix, which keeps nearly equal observables apart."""
 ALIKE = 100.0
-"""Repeats that the correlation of all conditions is worth in that of one. In a bank of 160 repeats a
-condition correlations differed between conditions by about what 100 repeats leave open."""
+"""Weight of the correlation of all conditions in that of one, in repeats: a bank of 160 repeats per condition
+showed differences of about the error of 100 repeats."""
 NEWTON_STEPS = 30
 CONVERGED = 1e-6
-"""Longest step of a fit that has arrived, in the logarithm of a variance."""
+"""Longest last step of a converged fit, in the logarithm of a variance."""
 EM_STEPS = 30
 
 
@@ -33,73 +31,53 @@ class Noise:
     """Covariance of one run as a function of the coded factors."""
 
     coefficients: np.ndarray
-    """Of the log-variances, (1 + factors, observables)."""
+    """Coefficients of the log-variances, (1 + factors, observables)."""
     spread: np.ndarray
     """Covariance of their errors, the same for all observables, (1 + factors, 1 + factors)."""
     correlation: np.ndarray
     """(observables, observables)."""
     degrees_of_freedom: int
-    """Number of independent deviations that the variances come from."""
+    """Number of independent deviations behind the variances."""
     correlation_freedom: float
-    """Number of those that the correlation is worth."""
+    """Number of deviations behind the correlation."""
 
     def variance(self, theta: np.ndarray) -> np.ndarray:
-        """Variance of one run, (..., observables), at coded factors (..., factors) kept to their ranges.
+        """Return the variance of one run at coded factors within their ranges, (..., observables).
 
-        The mean of all that it may be: weights are its inverse, and of an estimate from n squares that
-        inverse is n / (n - 2) times too large. A logarithm of variance v = 2 / n makes it exp(v).
+        It is the mean over its uncertainty: weights are its inverse, and the inverse of an estimate from n
+        squares is n / (n - 2) times too large. A logarithm of variance v = 2 / n makes that exp(v).
         """
         planes = _planes(np.clip(theta, -1.0, 1.0))
         open_ = ((planes @ self.spread) * planes).sum(axis=-1, keepdims=True)
         return np.asarray(np.exp(planes @ self.coefficients + open_))
 
     def covariance(self, theta: np.ndarray) -> np.ndarray:
-        """Covariance of one run at one point, (observables, observables)."""
+        """Return the covariance of one run at one point, (observables, observables)."""
         sd = np.sqrt(self.variance(theta))
         return np.asarray(sd[:, None] * self.correlation * sd)
 
     def inverse_bias(self, count: int) -> float:
-        """Factor that makes the inverse of the covariance of so many observables unbiased (Wishart).
+        """Return the factor that makes the inverse covariance of ``count`` observables unbiased (Wishart).
 
-        Less what its variances bring to it.
+        The bias due to the variances is taken out.
         """
         freedom = self.correlation_freedom
         return max(freedom - 2.0, 1.0) / max(freedom - count - 1.0, 1.0)
 
 
 def fit_noise(theta: np.ndarray, deviations: np.ndarray, floor: np.ndarray) -> Noise:
-    """Fit a covariance to independent deviations of mean zero.
-
-    Parameters
-    ----------
-    theta : (n, factors) array
-        Coded factors of each deviation.
-    deviations : (n, observables) array
-        Each with the covariance of one run.
-    floor : (observables,) array
-        Least standard deviations: what an observable can resolve.
-    """
+    """Fit a covariance to independent deviations of mean zero (`fit_noises`, for one condition)."""
     return fit_noises([(theta, deviations)], floor)[0]
 
 
 def fit_noises(repeats: Sequence[tuple[np.ndarray, np.ndarray]], floor: np.ndarray) -> list[Noise]:
-    """Fit the covariances of some conditions, which learn from one another.
+    """Fit the covariances of some conditions together.
 
-    A plane is that of all conditions and what one differs by. How much coefficients differ, all observables
-    say together. Two dozen repeats alone leave a variance open by a factor of 1.5, and a search that takes
-    it as known raised six alarms for one that it declared.
-
-    Parameters
-    ----------
-    repeats : sequence of ((n, factors) array, (n, observables) array)
-        Coded factors and deviations of each condition, as of `fit_noise`.
-    floor : (observables,) array
-
-    Returns
-    -------
-    list of Noise
-        Maximum of the penalised gamma likelihood of the squared deviations, by Fisher scoring; expectation
-        and maximisation find the penalties.
+    Each condition has coded factors (n, factors) and deviations (n, observables) with the covariance of one
+    run. A plane is the common one plus the condition's own difference; all observables together determine the
+    size of the differences. Two dozen repeats alone leave a variance open by a factor of 1.5. ``floor`` is
+    the resolution of the observables, as a standard deviation. Fisher scoring maximises the penalised gamma
+    likelihood of the squared deviations; expectation and maximisation find the penalties.
     """
     planes = [_planes(theta) for theta, _ in repeats]
     maps = _maps(len(repeats), planes[0].shape[1])
@@ -117,12 +95,12 @@ def fit_noises(repeats: Sequence[tuple[np.ndarray, np.ndarray]], floor: np.ndarr
 
 
 def _planes(theta: np.ndarray) -> np.ndarray:
-    """Terms of a plane at coded factors (..., factors), (..., 1 + factors)."""
+    """Return the terms of a plane at coded factors (..., factors), (..., 1 + factors)."""
     return np.concatenate([np.ones((*theta.shape[:-1], 1)), theta], axis=-1)
 
 
 def _maps(conditions: int, size: int) -> list[np.ndarray]:
-    """Plane of each condition from all coefficients: those of all, then what each differs by, if several."""
+    """Return the map from all coefficients, common ones first, to the plane of each condition."""
     if conditions == 1:
         return [np.eye(size)]
     own = np.eye(conditions * size).reshape(conditions, size, conditions * size)
@@ -130,9 +108,9 @@ def _maps(conditions: int, size: int) -> list[np.ndarray]:
 
 
 def _fit_planes(terms: np.ndarray, squares: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients (terms, observables) of log-variances and the covariance of their errors (terms, terms).
+    """Return coefficients (terms, observables) of log-variances and the covariance of their errors.
 
-    The first so many are those of the plane of all, the others of what conditions differ by.
+    The first ``size`` are those of the common plane, the others differences of conditions.
     """
     coefficients = np.zeros((terms.shape[1], squares.shape[1]))
     coefficients[0] = np.log(squares.mean(axis=0))
@@ -156,7 +134,7 @@ def _fit_planes(terms: np.ndarray, squares: np.ndarray, size: int) -> tuple[np.n
 
 
 def correlation_of(standard: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Correlation of deviations (n, observables) in standard deviations, (observables, observables)."""
+    """Return the correlation of standardised deviations (n, observables), (observables, observables)."""
     size = standard.shape[1]
     moments = (weights[:, None] * standard).T @ standard / weights.sum() + 1e-9 * np.eye(size)
     scale = np.sqrt(np.diag(moments))
@@ -165,17 +143,16 @@ def correlation_of(standard: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def shared_correlations(noises: Sequence[Noise]) -> list[Noise]:
-    """Let conditions learn from one another how observables hang together.
+    """Draw the correlation of each condition towards the mean of all.
 
-    The correlation of each is drawn towards the mean of all: the mean of a Wishart posterior whose prior is
-    worth `ALIKE` repeats.
+    It is the mean of a Wishart posterior whose prior has the weight of `ALIKE` repeats.
     """
     counts = np.array([noise.degrees_of_freedom for noise in noises], dtype=float)
     mean = np.average([noise.correlation for noise in noises], axis=0, weights=counts)
     out = []
     for noise, count in zip(noises, counts, strict=True):
         share = ALIKE / (ALIKE + count) if len(noises) > 1 else 0.0
-        # Neither are all conditions alike, nor is their mean known without error.
+        # conditions differ, and their mean has an error
         variance = (1.0 - share) / count + share**2 / counts.sum()
         correlation = share * mean + (1.0 - share) * noise.correlation
         out.append(replace(noise, correlation=correlation, correlation_freedom=1.0 / variance))
@@ -183,18 +160,9 @@ def shared_correlations(noises: Sequence[Noise]) -> list[Noise]:
 
 
 def fit_growth(size: np.ndarray, ratios: np.ndarray) -> np.ndarray:
-    """Fit exp(growth x size) to the mean of squared deviations over the variance that they have at size 0.
+    """Fit exp(growth x size) to ratios (n, observables) of squared deviations to the variance at size 0.
 
-    Parameters
-    ----------
-    size : (n,) array
-        Coded sizes.
-    ratios : (n, observables) array
-
-    Returns
-    -------
-    (observables,) array
-        Maximum of the gamma likelihood, with the prior of a slope, by Fisher scoring.
+    It is the maximum of the gamma likelihood, with the prior of a slope, by Fisher scoring, (observables,).
     """
     growth = np.zeros(ratios.shape[1])
     information = 0.5 * np.sum(size**2) + SLOPE_SD**-2
@@ -206,21 +174,10 @@ def fit_growth(size: np.ndarray, ratios: np.ndarray) -> np.ndarray:
 
 
 def repeat_deviations(groups: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Deviations of repeated runs from their means, independent and of the covariance of one run.
+    """Return independent deviations of repeated runs, each with the covariance of one run.
 
-    A group of r repeats gives r - 1 (Helmert's contrasts).
-
-    Parameters
-    ----------
-    groups : (n,) array
-        Runs of the same number are repeats.
-    values : (n, observables) array
-
-    Returns
-    -------
-    rows : (m,) int array
-        A run of the group of each deviation.
-    deviations : (m, observables) array
+    A group of r repeats gives r - 1 (Helmert's contrasts). Runs of the same group number are repeats. The
+    first array is a run of the group of each deviation, (m,), the second the deviations, (m, observables).
     """
     order = np.argsort(groups, kind="stable")
     rows, deviations = [], []

@@ -1,8 +1,8 @@
 """Fits of response surfaces to the runs of a bank.
 
-What a few terms lack all observables lack alike, as if a parameter were another; so there are many, and those
-that all runs together show little of are shrunk. Where leave-one-out shows that a polynomial fails, the rest
-is kriged.
+A misfit of few terms affects all observables alike, as if a parameter were another; so there are many terms,
+and those with little evidence in all runs together are shrunk. Where leave-one-out shows that a polynomial
+fails, the rest is kriged.
 """
 
 from __future__ import annotations
@@ -33,44 +33,38 @@ from doe.errors import RuleError
 from doe.numerics.kriging import Covariance
 
 FAILURE_LEVEL = 0.005
-"""A polynomial fails if leave-one-out errors as large as its own have this probability under noise alone."""
+"""Probability under noise alone of leave-one-out errors from which on a polynomial fails."""
 LEAST_RATIO = 1e-6
-"""Residuals of smaller mean squares, in those of the noise, are as good as none."""
+"""Least mean square of residuals, in those of the noise."""
 EM_STEPS = 100
 FIRST_SCALE = 3.0
-"""Standard deviation of a coefficient, in that of one run, before the runs have said how large they are."""
+"""First standard deviation of a coefficient, in that of one run."""
 SCALE_ROUNDS = 2
-"""Times that scales and noise are found, each from the other."""
+"""Rounds in which scales and noise are found, each from the other."""
 LEAST_SCALE = 1e-3
-"""Least standard deviation of a coefficient, in that of one run: smaller ones are nothing."""
+"""Least standard deviation of a coefficient, in that of one run."""
 LEAST_SIZE = 0.05
-"""Runs of smaller coded sizes say too little of what a mechanism adds to be divided by their size."""
+"""Coded size below which the addition of a mechanism is not divided by its size."""
 
 
 def repeats_of(theta: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coded factors (m, factors) and independent deviations (m, observables) of repeats without a mechanism.
+    """Return coded factors and independent deviations of repeats without a mechanism, at equal factors.
 
-    Parameters
-    ----------
-    theta, values : (n, factors), (n, observables) array
-        Repeats have equal factors.
-
-    Raises
-    ------
-    RuleError
-        With too few finished runs for the noise or the polynomial of `fit_bases`.
+    Raises RuleError: too few finished runs for the noise or the polynomial of `fit_bases`.
     """
     points, groups = np.unique(theta, axis=0, return_inverse=True)
     rows, deviations = repeat_deviations(groups.reshape(-1), values)
     if len(rows) <= values.shape[1] + 1 or len(points) <= quadratic(points).shape[1]:
-        rule = "needs more points without a mechanism than polynomial terms, and repeats than observables"
+        rule = (
+            "must have more points without a mechanism than polynomial terms, more repeats than observables"
+        )
         raise RuleError("bank", rule, f"{len(points)} points, {len(rows)} repeats")
     return theta[rows], deviations
 
 
 @dataclass(frozen=True, eq=False)
 class _Shrunk:
-    """A least squares fit with coefficients drawn towards nothing."""
+    """Least squares fit with coefficients shrunk towards zero."""
 
     gram_inverse: np.ndarray
     """Covariance of the coefficients, in variances of one run, (terms, terms)."""
@@ -94,24 +88,24 @@ class _Shrunk:
 
     @property
     def chance(self) -> np.ndarray:
-        """Covariance that noise alone gives the coefficients, in variances of one run, (terms, terms)."""
+        """Covariance of the coefficients due to noise alone, in variances of one run, (terms, terms)."""
         return self.inverse @ self.inverse.T
 
 
 @dataclass(frozen=True, eq=False)
 class BaseRuns:
-    """Runs without a mechanism in one condition, repeats taken together."""
+    """Runs without a mechanism in one condition, repeats averaged."""
 
     theta: np.ndarray
-    """Each once, (n, factors)."""
+    """Coded factors of each distinct point, (n, factors)."""
     repeats: np.ndarray
-    """(n,)."""
+    """Runs of each point, (n,)."""
     means: np.ndarray
-    """(n, observables)."""
+    """Means of the repeats, (n, observables)."""
     noise: Noise
-    """Of one run."""
+    """Noise of one run."""
     kriged: Mapping[int, Covariance] | None = None
-    """Covariances of the columns that an earlier fit kriged; None: to be found."""
+    """Covariances of the columns that an earlier fit kriged; None: search for them."""
 
     @classmethod
     def of(
@@ -121,7 +115,7 @@ class BaseRuns:
         noise: Noise,
         kriged: Mapping[int, Covariance] | None = None,
     ) -> BaseRuns:
-        """Take the repeats among runs (n, factors), (n, observables) together."""
+        """Average the repeats among runs (n, factors), (n, observables)."""
         points, groups, repeats = np.unique(theta, axis=0, return_inverse=True, return_counts=True)
         sums = np.zeros((len(points), values.shape[1]))
         np.add.at(sums, groups.reshape(-1), values)
@@ -129,19 +123,19 @@ class BaseRuns:
 
     @property
     def terms(self) -> np.ndarray:
-        """Terms of the base, each row as many times as its runs say it: by the root of their number."""
+        """Terms of the base, each row times the root of its number of runs."""
         return np.asarray(np.sqrt(self.repeats)[:, None] * cubic(self.theta))
 
     @property
     def response(self) -> np.ndarray:
-        """The means likewise, with the noise of one run, (n, observables)."""
+        """Means times the same root, with the noise of one run, (n, observables)."""
         return np.asarray(np.sqrt(self.repeats)[:, None] * self.means)
 
 
 def fit_bases(conditions: Sequence[BaseRuns]) -> list[Surfaces]:
     """Fit the emulators of all conditions without mechanisms.
 
-    The terms of third order are drawn towards nothing as those of the mechanisms are (`fit_additions`).
+    The terms of third order are shrunk as those of the mechanisms are (`fit_additions`).
     """
     free = quadratic(conditions[0].theta).shape[1]
     grams, moments = [], []
@@ -161,24 +155,13 @@ def fit_bases(conditions: Sequence[BaseRuns]) -> list[Surfaces]:
 
 
 def shared_misfits(ratio: np.ndarray, freedom: np.ndarray, degrees: np.ndarray) -> np.ndarray:
-    """Variances of what polynomials miss, in those of one run, said by all conditions and observables.
+    """Return variances of polynomial misfits, in those of one run, from all conditions and observables.
 
-    A misfit that is as large as the noise of a mean is too small to be seen in one observable of one
-    condition, and not to be neglected. Logarithms of the ratios less their mean under noise alone scatter by
-    that of F, and about the mean of all by how misfits differ; each is as much nearer to that mean as its
-    noise makes it (Smyth 2004, doi:10.2202/1544-6115.1027, for variances of many genes).
-
-    Parameters
-    ----------
-    ratio : (conditions, observables) array
-        Mean squares of residuals over those of repeats.
-    freedom, degrees : (conditions, 1) array
-        Degrees of freedom of the two.
-
-    Returns
-    -------
-    (conditions, observables) array
-        Not below 0.
+    ``ratio`` holds mean squares of residuals over those of repeats, (conditions, observables). A misfit as
+    large as the noise of a mean is invisible in one observable of one condition, yet not negligible.
+    Logarithms of the ratios, less their mean under noise alone, scatter by that of F and about the common
+    mean by the differences of misfits; each is shrunk to that mean by its noise (Smyth 2004,
+    doi:10.2202/1544-6115.1027, for variances of many genes).
     """
     halves = 0.5 * freedom, 0.5 * degrees
     expected = (special.digamma(halves[0]) - np.log(halves[0])) - (
@@ -217,7 +200,7 @@ class _BaseFit:
         return np.asarray(excess.mean(axis=0) / self.noise.mean(axis=0))
 
     def surfaces(self, misfit: np.ndarray) -> Surfaces:
-        """Emulator, of a misfit in variances of one run; where it fails, what is smooth is kriged."""
+        """Return the emulator for misfits in variances of one run; a smooth misfit is kriged."""
         runs, repeats = self.runs, self.runs.repeats[:, None]
         missed, scatter = self.fitted.residual / np.sqrt(repeats), self.noise / repeats
         fails = self.ratio > stats.f.isf(FAILURE_LEVEL, self.freedom, runs.noise.degrees_of_freedom)
@@ -235,24 +218,24 @@ class AddedRuns:
     """Runs with one mechanism in one condition."""
 
     base: Surfaces
-    """Of the condition."""
+    """Surfaces of the condition without the mechanism."""
     theta: np.ndarray
-    """(n, factors)."""
+    """Coded factors, (n, factors)."""
     size: np.ndarray
-    """Coded, (n,)."""
+    """Coded sizes, (n,)."""
     values: np.ndarray
     """(n, observables)."""
     kriged: Mapping[int, Covariance] | None = None
-    """Covariances of the columns that an earlier fit kriged; None: to be found."""
+    """Covariances of the columns that an earlier fit kriged; None: search for them."""
 
     @property
     def terms(self) -> np.ndarray:
-        """Terms of what the mechanism adds, (n, terms)."""
+        """Terms of the mechanism's addition, (n, terms)."""
         return added(self.theta, self.size)
 
     @property
     def difference(self) -> np.ndarray:
-        """Part that it added, with noise, (n, observables)."""
+        """Addition of the mechanism, with noise, (n, observables)."""
         return np.asarray(self.values - self.base.predict(self.theta, ()))
 
     @property
@@ -262,10 +245,10 @@ class AddedRuns:
 
 
 def fit_additions(conditions: Sequence[AddedRuns]) -> list[Addition]:
-    """Fit what one mechanism adds in every condition.
+    """Fit the addition of one mechanism in every condition.
 
-    How large its coefficients are, in standard deviations of one run, all conditions and observables say
-    together (`likeliest_scales`); each is as much nearer to nothing as its noise makes it.
+    All conditions and observables together determine the sizes of its coefficients, in standard deviations of
+    one run (`likeliest_scales`); each is shrunk to zero by its noise.
     """
     grams = [runs.terms.T @ runs.terms for runs in conditions]
     scales = np.full(len(grams[0]), FIRST_SCALE)
@@ -280,9 +263,9 @@ def fit_additions(conditions: Sequence[AddedRuns]) -> list[Addition]:
 
 
 def _with_correlations(conditions: Sequence[AddedRuns], additions: Sequence[Addition]) -> list[Addition]:
-    """Let all conditions say together how observables hang together under a mechanism.
+    """Replace the correlation of runs with a mechanism by one estimated from all conditions.
 
-    They count by their sizes, and the correlation without the mechanism as `ALIKE` runs.
+    Runs count by their sizes, and the correlation without the mechanism as `ALIKE` runs.
     """
     standard = [
         (runs.difference - one.predict(runs.theta, runs.size))
@@ -298,7 +281,7 @@ def _with_correlations(conditions: Sequence[AddedRuns], additions: Sequence[Addi
 
 
 def _growth(runs: AddedRuns, fitted: _Shrunk) -> np.ndarray:
-    """Runs with a mechanism scatter more: an excess of the residuals is noise unless it is smooth."""
+    """Return the growth of the scatter under a mechanism; residuals are noise unless they are smooth."""
     return fit_growth(runs.size, fitted.residual**2 / (1.0 - fitted.leverage) / runs.noise)
 
 
@@ -341,21 +324,11 @@ def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
 
 
 def likeliest_scales(grams: Sequence[np.ndarray], moments: Sequence[np.ndarray]) -> np.ndarray:
-    """Standard deviations of coefficients of largest likelihood, given data y.
+    """Return standard deviations of coefficients of largest likelihood, (terms,), given data y.
 
-    Data scatter about X times the coefficients with variance one, coefficients about nothing with the squares
-    of the scales (Efron and Morris 1973), which expectation and maximisation find.
-
-    Parameters
-    ----------
-    grams : sequence of (terms, terms) array
-        X'X of each condition.
-    moments : sequence of (terms, observables) array
-        X'y of each.
-
-    Returns
-    -------
-    (terms,) array
+    Data scatter about X times the coefficients with variance one, coefficients about zero with the squares of
+    the scales (Efron and Morris 1973); expectation and maximisation find these from X'X and X'y of each
+    condition.
     """
     squares = np.ones(len(grams[0]))
     for _ in range(EM_STEPS):

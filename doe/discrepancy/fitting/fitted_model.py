@@ -1,6 +1,4 @@
-"""A model to be fitted: the base with some mechanisms, as emulated or as fresh runs correct it."""
-
-from __future__ import annotations
+"""A model to be fitted: the base with some mechanisms, as emulated or as corrected by fresh runs."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -22,10 +20,10 @@ STEP = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Shift:
-    """The emulator at one point is the simulator at another: they differ by so much, in all conditions."""
+    """Difference of coded parameters between emulator and simulator, common to all conditions."""
 
     value: np.ndarray
-    """Coded, (parameters,)."""
+    """Coded difference, (parameters,)."""
     spread: np.ndarray
     """Covariance of its error, (parameters, parameters)."""
 
@@ -37,15 +35,15 @@ class Model:
     emulator: Emulator
     mechanisms: tuple[str, ...]
     systematic: float
-    """Standard deviation, in units of that of one run, that is added to the error of every mean."""
+    """Standard deviation that is added to the error of every mean, in units of that of one run."""
     shift: Shift | None = None
-    """By how much the emulator's parameters are off; None for the emulator alone."""
+    """Error of the emulator's parameters; None for the emulator alone."""
     corrections: Mapping[str, Correction] = field(default_factory=dict)
-    """By condition, what it misses besides; empty for the emulator alone."""
+    """Further corrections by condition; empty for the emulator alone."""
     heading: float = 0.0
     """Azimuth of its directed mechanisms [deg]."""
     views: Mapping[str, float] = field(default_factory=dict)
-    """By condition, the azimuth that it is seen from [deg]; left out: 0."""
+    """Azimuth of the view by condition [deg]. Default: 0."""
 
     @cached_property
     def is_directed(self) -> bool:
@@ -59,7 +57,7 @@ class Model:
         return np.isin(self.emulator.observables, self.emulator.space.odd)
 
     def turn(self, condition: str) -> np.ndarray:
-        """Share of each observable that is seen from the azimuth of a condition, (observables,)."""
+        """Return the share of each observable that is visible under a condition, (observables,)."""
         seen = math.cos(math.radians(self.heading - self.views.get(condition, 0.0)))
         return np.where(self.odd, seen, 1.0)
 
@@ -79,30 +77,30 @@ class Model:
         return (self.lower + self.upper) / 2.0
 
     def predict(self, x: np.ndarray, condition: str) -> np.ndarray:
-        """Observables at coded parameters (n, parameters), (n, observables)."""
+        """Return observables at coded parameters (n, parameters), (n, observables)."""
         shifted = x if self.shift is None else x + self.shift.value
         values = self.emulator.surfaces[condition].predict(shifted, self.mechanisms)
         if condition in self.corrections:
             values = values + self.corrections[condition].mean(x)
-        # without a direction odd observables are noise, which has no mean to be turned
+        # without a direction odd observables are noise, and their mean is zero
         return values * self.turn(condition) if self.is_directed else values
 
     def run_covariance(self, x: np.ndarray, condition: str) -> np.ndarray:
-        """Covariance of one run at one row of coded parameters, (observables, observables)."""
+        """Return the covariance of one run at one row of coded parameters, (observables, observables)."""
         covariance = self.emulator.surfaces[condition].noise_covariance(x, self.mechanisms)
         if condition in self.corrections:
             ratio = self.corrections[condition].noise_ratio
             covariance = ratio[:, None] * covariance * ratio
         if not self.is_directed:
             return covariance
-        # from any side odd observables scatter alike, with the others as much as they are turned towards it
+        # odd observables scatter alike from any side; their covariance with the others turns
         turn = self.turn(condition)
         return np.where(self.odd[:, None] & self.odd, covariance, covariance * np.outer(turn, turn))
 
     def excess(self, x: np.ndarray, scatter: Scatter, runs: Mapping[str, np.ndarray] | None = None) -> Excess:
-        """Estimate what replicates scatter more than its runs do at one row of coded parameters.
+        """Estimate the scatter of replicates beyond that of runs at one row of coded parameters.
 
-        Covariances of the runs by condition, where they are known, need not be computed again.
+        Known covariances of the runs by condition are not computed again.
         """
         runs = runs or {}
         own = {n: runs[n] if n in runs else self.run_covariance(x, n) for n in scatter.products}
@@ -110,20 +108,20 @@ class Model:
         return scatter.excess(own, known, len(self.emulator.observables))
 
     def noise(self, x: np.ndarray, block: Block, excess: Excess | None = None) -> np.ndarray:
-        """Covariance of the noise of the means of a block, at one row of coded parameters, (k, k).
+        """Return the covariance of the noise of a block's means at one row of coded parameters, (k, k).
 
-        What its replicates scatter beyond the model is that at these parameters, unless it is given.
+        The excess of its replicates is computed at these parameters, unless it is given.
         """
         excess = self.excess(x, block.scatter) if excess is None else excess
         return self.noise_of(self.run_covariance(x, block.condition), block, excess)
 
     def noise_of(self, run: np.ndarray, block: Block, excess: Excess) -> np.ndarray:
-        """Covariance of the noise of the means of a block, of that of one run, (k, k)."""
+        """Return the covariance of the noise of a block's means from that of one run, (k, k)."""
         freed = self.emulator.surfaces[block.condition].noise.inverse_bias(len(block.columns))
         return block.noise(run, excess) * freed
 
     def open_error(self, x: np.ndarray, block: Block) -> np.ndarray:
-        """Covariance of what bank and fresh runs leave open of the prediction of a block, (k, k)."""
+        """Return the covariance that bank and fresh runs leave to the prediction of a block, (k, k)."""
         surfaces = self.emulator.surfaces[block.condition]
         if block.condition in self.corrections:
             error = self.corrections[block.condition].error(x)
@@ -135,15 +133,10 @@ class Model:
         return np.asarray(error[np.ix_(block.columns, block.columns)])
 
     def slope_chance(self, x: np.ndarray, block: Block) -> tuple[np.ndarray, np.ndarray]:
-        """Covariances that the noise of bank and fresh runs gives the slopes of the prediction of a block.
+        """Return covariances of the slopes of a block's prediction due to the noise of bank and fresh runs.
 
-        That of what is kriged is not counted.
-
-        Returns
-        -------
-        of_each : (k, parameters, parameters) array
-        correlation : (k, k) array
-            Of the slopes of two means.
+        Kriged parts are not counted. The first array is (k, parameters, parameters), the second the
+        correlation of the slopes of two means, (k, k).
         """
         surfaces, size = self.emulator.surfaces[block.condition], len(x)
         near = x + STEP * np.concatenate([np.eye(size), -np.eye(size)])
@@ -161,9 +154,9 @@ class Model:
         return of_each[block.columns], correlation[np.ix_(block.columns, block.columns)]
 
     def shift_slopes(self, x: np.ndarray, block: Block) -> np.ndarray:
-        """Derivatives of the prediction of a block by the shift, (k, parameters).
+        """Return derivatives of the prediction of a block by the shift, (k, parameters).
 
-        Where there are fresh runs, the corrections take back what a shift does to the emulated.
+        Where there are fresh runs, the corrections undo the effect of a shift on the emulated values.
         """
         slopes = self._emulated_slopes(x[None], block.condition)[0]
         if block.condition in self.corrections:
@@ -175,7 +168,7 @@ class Model:
         return np.asarray(slopes[block.columns])
 
     def _emulated_slopes(self, x: np.ndarray, condition: str) -> np.ndarray:
-        """Derivatives without corrections at coded (n, parameters), (n, observables, parameters)."""
+        """Return derivatives without corrections at coded (n, parameters), (n, observables, parameters)."""
         plain = replace(self, corrections={}, views={}, heading=0.0)
         steps = STEP * np.eye(x.shape[1])
         sides = [[plain.predict(x + side * step, condition) for step in steps] for side in (1.0, -1.0)]
@@ -183,7 +176,7 @@ class Model:
         return np.asarray((ahead - behind) / (2.0 * STEP))
 
     def error(self, x: np.ndarray, block: Block) -> np.ndarray:
-        """Covariance of the error of the prediction of a block, with what is systematic, (k, k)."""
+        """Return the covariance of the error of a block's prediction, with the systematic error, (k, k)."""
         theta = x[: len(self.emulator.space.factors)]
         own = self.systematic**2 * self.emulator.surfaces[block.condition].noise.variance(theta)
         return np.asarray(self.open_error(x, block) + np.diag(own[block.columns]))
@@ -191,57 +184,47 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """A model against the means of some conditions, as one vector."""
+    """Model and the means of some conditions, as one vector."""
 
     model: Model
     blocks: tuple[Block, ...]
 
     @cached_property
     def target(self) -> np.ndarray:
-        """The measured means, (means,)."""
+        """Measured means, (means,)."""
         return np.concatenate([block.mean for block in self.blocks])
 
     def predict(self, x: np.ndarray) -> np.ndarray:
-        """The predicted means at coded parameters (n, parameters), (n, means)."""
+        """Return the predicted means at coded parameters (n, parameters), (n, means)."""
         parts = [self.model.predict(x, block.condition)[:, block.columns] for block in self.blocks]
         return np.concatenate(parts, axis=1)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Derivatives by central differences at coded parameters, (n, means, parameters)."""
+        """Return derivatives by central differences at coded parameters, (n, means, parameters)."""
         count, size = x.shape
         steps = STEP * np.concatenate([np.eye(size), -np.eye(size)])
         values = self.predict((x[:, None, :] + steps).reshape(-1, size)).reshape(count, 2 * size, -1)
         return np.asarray(np.swapaxes(values[:, :size] - values[:, size:], 1, 2) / (2.0 * STEP))
 
     def covariance(self, x: np.ndarray) -> np.ndarray:
-        """Covariance of measured less predicted means at one row of coded parameters, (means, means)."""
+        """Return the covariance of measured less predicted means at one row of coded parameters."""
         own = self.noise(x) + _blocks(self.model.error(x, block) for block in self.blocks)
         return own + self.common.T @ self.common
 
     def open_error(self, x: np.ndarray) -> np.ndarray:
-        """Covariance of what is open of the predictions at one row of coded parameters, (means, means)."""
+        """Return the covariance of the predictions' own errors at one row of coded parameters."""
         return _blocks(self.model.open_error(x, block) for block in self.blocks)
 
     def shift_slopes(self, x: np.ndarray) -> np.ndarray:
-        """Derivatives of the predicted means by the model's shift, (means, parameters)."""
+        """Return derivatives of the predicted means by the model's shift, (means, parameters)."""
         return np.concatenate([self.model.shift_slopes(x, block) for block in self.blocks])
 
     def feigned_information(self, x: np.ndarray, precision: np.ndarray) -> np.ndarray:
-        """Information on the parameters that is none: noise in the slopes, squared with them.
+        """Return the spurious information on the parameters: the square of the noise in the slopes.
 
-        Slopes J that noise of covariance S is in have an expected J' P J that is too large by that of the
-        noise (Fuller 1987, Measurement Error Models, chapter 1).
-
-        Parameters
-        ----------
-        x : (parameters,) array
-            Coded.
-        precision : (means, means) array
-            P, inverse covariance of measured less predicted means.
-
-        Returns
-        -------
-        (parameters, parameters) array
+        Slopes J with noise of covariance S have an expected J' P J that is too large by that of the noise
+        (Fuller 1987, Measurement Error Models, chapter 1), with P the inverse covariance of measured less
+        predicted means.
         """
         feigned, start = np.zeros((len(x), len(x))), 0
         for block in self.blocks:
@@ -249,7 +232,7 @@ class Stack:
             own, correlation = self.model.slope_chance(x, block)
             sd = np.sqrt(np.maximum(np.einsum("jaa->j", own), np.finfo(float).tiny))
             weights = precision[start:end, start:end] * correlation * np.outer(sd, sd)
-            # of two means the shape is taken as the mean of theirs
+            # for two means the shape is the mean of both
             feigned += np.einsum("j,jab->ab", weights.sum(axis=0) / sd**2, own)
             start = end
         return feigned
@@ -258,7 +241,7 @@ class Stack:
     def common(self) -> np.ndarray:
         """Change of the means by a standard deviation of each calibration error, (2 observables, means).
 
-        Offsets of all observables, then scales, by the numbers of their errors.
+        Offsets of all observables come first, then scales, by the numbers of their errors.
         """
         numbers = np.arange(len(self.model.emulator.observables))[:, None]
         errors = np.concatenate([[block.columns, block.scales] for block in self.blocks], axis=1)
@@ -267,7 +250,7 @@ class Stack:
         return np.concatenate([np.where(error == numbers, each, 0.0) for error, each in parts])
 
     def noise(self, x: np.ndarray) -> np.ndarray:
-        """Covariance of the measured means alone, (means, means)."""
+        """Return the covariance of the measured means alone, (means, means)."""
         model = self.model
         runs = {block.condition: model.run_covariance(x, block.condition) for block in self.blocks}
         # all blocks are means of the same replicates, or of as few

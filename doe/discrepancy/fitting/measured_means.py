@@ -14,36 +14,36 @@ from doe.discrepancy.problem.replicates import Calibration, Measured
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """The means of one condition."""
+    """Means of one condition."""
 
     condition: str
     columns: np.ndarray
-    """Observables of the emulator that were measured, (k,)."""
+    """Numbers of the emulator's observables that were measured, (k,)."""
     mean: np.ndarray
     """(k,)."""
     share: np.ndarray
     """Covariance of the means over that of one replicate: 1 / n where all have n replicates, (k, k)."""
     scatter: Scatter
-    """Of the replicates of all conditions."""
+    """Scatter of the replicates of all conditions."""
     common: np.ndarray
-    """Change of each mean by a standard deviation of the offset, and of the scale, of its observable, which
-    all conditions share, (2, k)."""
+    """Change of each mean by a standard deviation of the offset, and of the scale, of its observable, common
+    to all conditions, (2, k)."""
     scales: np.ndarray
     """Number of the error of scale of each mean (`scale_numbers`), (k,)."""
 
     @classmethod
     def of_runs(cls, condition: str, columns: np.ndarray, count: int) -> Block:
-        """Means of so many runs of a model, which scatter as the model does; they are nowhere needed."""
+        """Return the means of simulated runs, as zeros, with the scatter of the model."""
         return cls.of_means(condition, columns, np.zeros(len(columns)), count)
 
     @classmethod
     def of_means(cls, condition: str, columns: np.ndarray, mean: np.ndarray, count: int) -> Block:
-        """Means of so many replicates that scatter as the model does, measured without error."""
+        """Return the means of replicates that scatter as the model does, measured without error."""
         share = np.full((len(columns), len(columns)), 1.0 / count)
         return cls(condition, columns, mean, share, NOTHING, np.zeros((2, len(columns))), columns)
 
     def calibrated(self, observables: Sequence[str], calibration: Mapping[str, Calibration]) -> Block:
-        """Return the same with what instruments may be off by, by observable of the emulator."""
+        """Return the same with calibration errors by observable of the emulator."""
         known = [calibration.get(observables[column], Calibration()) for column in self.columns]
         moved = np.array(
             [[one.offset, one.scale * value] for one, value in zip(known, self.mean, strict=True)]
@@ -57,30 +57,30 @@ class Block:
         return np.rint(1.0 / np.diag(self.share)).astype(int)
 
     def noise(self, covariance: np.ndarray, excess: Excess) -> np.ndarray:
-        """Covariance of the means' noise (k, k), of that of one run and what replicates scatter beyond it."""
+        """Return the covariance of the means' noise (k, k) from that of one run and the excess."""
         return np.asarray(excess.added_to(covariance)[np.ix_(self.columns, self.columns)] * self.share)
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Measured means, cut to what the emulator knows."""
+    """Measured means of the observables and conditions of the emulator."""
 
     training: tuple[Block, ...]
     held_out: tuple[Block, ...]
     notes: tuple[str, ...]
     calibration: Mapping[str, Calibration]
-    """By observable, what its instrument may be off by."""
+    """Calibration errors by observable."""
     views: Mapping[str, float]
-    """By condition, the azimuth that it was seen from [deg]."""
+    """Azimuth of the view by condition [deg]."""
 
     @property
     def count(self) -> int:
-        """Means that take part in a fit."""
+        """Number of means in a fit."""
         return sum(len(block.mean) for block in self.training)
 
 
 def gather(measured: Measured, emulator: Emulator) -> Evidence:
-    """Cut measured data to the emulator's conditions and observables; the notes say what is left out."""
+    """Reduce measured data to the emulator's conditions and observables; notes name the parts left out."""
     notes = list(measured.notes)
     strange = [name for name in measured.observables if name not in emulator.observables]
     notes += [f"{name} is not among the simulated observables: left out" for name in strange]
@@ -123,7 +123,7 @@ def _block(measured: Measured, emulator: Emulator, condition: str, scatter: Scat
 
 
 def scale_numbers(observables: Sequence[str], calibration: Mapping[str, Calibration]) -> np.ndarray:
-    """Number the errors of scale: each has that of the first observable of its instrument, (observables,)."""
+    """Return the number of each observable's error of scale: the first observable of its instrument."""
     first: dict[str, int] = {}
     of = [calibration.get(name, Calibration()).instrument for name in observables]
     return np.array([first.setdefault(name, at) if name else at for at, name in enumerate(of)], dtype=int)

@@ -1,7 +1,7 @@
-"""Misses of an emulator beside fresh runs: a shift of its parameters, and how large the rest may be.
+"""Misses of an emulator at fresh runs: a shift of its parameters, and the size of the rest.
 
-In the residuals of fresh runs stand the noise, errors of the emulator's coefficients, a smooth function that
-its terms lack, and what a shift of the parameters does in all observables and conditions together.
+Residuals of fresh runs contain the noise, errors of the emulator's coefficients, a smooth function that its
+terms lack, and the effect of a shift of the parameters in all observables and conditions together.
 """
 
 from __future__ import annotations
@@ -16,28 +16,28 @@ from doe.discrepancy.fitting.fitted_model import STEP, Model, Shift
 from doe.discrepancy.fitting.model_fit import whiten
 
 LENGTH = 0.7
-"""Length over which the smooth function changes, in half ranges: what the emulator's terms leave over."""
+"""Length of the smooth function, in half ranges."""
 AMPLITUDES = 0.04 * 4.0 ** np.arange(6)
 """Variances of the smooth function tried, in units of the noise of one run."""
 SHIFT_SD = 0.15
 """Prior standard deviation of a shift of parameters, in their ranges."""
 SHIFT_STEPS = 4
-"""Steps of Gauss and Newton that find it."""
+"""Gauss-Newton steps that find it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Fresh runs of one model that finished."""
+    """Finished fresh runs of one model."""
 
     x: np.ndarray
-    """Coded, (n, parameters)."""
+    """Coded parameters, (n, parameters)."""
     conditions: np.ndarray
     """(n,)."""
     values: np.ndarray
-    """Of the emulator's observables, (n, observables)."""
+    """Values of the emulator's observables, (n, observables)."""
 
     def joined(self, other: Runs) -> Runs:
-        """These and other runs."""
+        """Return these and other runs."""
         return Runs(
             np.concatenate([self.x, other.x]),
             np.concatenate([self.conditions, other.conditions]),
@@ -46,20 +46,11 @@ class Runs:
 
 
 def likeliest_shift(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray) -> Shift:
-    """Find by how much the emulator's parameters are off, by least squares over fresh runs of all conditions.
+    """Find the error of the emulator's parameters, by least squares over fresh runs of all conditions.
 
-    What its terms lack of one response they lack of all, as if a parameter were another. Seen in all
-    observables together that is far beyond the noise where it is nothing in any of them.
-
-    Parameters
-    ----------
-    model : Model
-        Not corrected.
-    runs : Runs
-    centre : (parameters,) array
-        Where the noise is taken.
-    ratio : (observables,) array
-        Variance of one run over the emulator's.
+    A misfit of its terms affects all responses alike, as if a parameter were another. It may be visible in
+    all observables together and in no single one. The noise is that at the centre, times the ratio of
+    variances (observables,).
     """
     prior, sd = _precision(model), np.sqrt(ratio)
     whitenings = {}
@@ -81,7 +72,7 @@ def likeliest_shift(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndar
 
 
 def _slope(model: Model, x: np.ndarray, direction: np.ndarray, condition: str) -> np.ndarray:
-    """Derivatives in a direction at coded parameters (n, parameters), (n, observables)."""
+    """Return derivatives in a direction at coded parameters (n, parameters), (n, observables)."""
     ahead, behind = (model.predict(x + side * STEP * direction, condition) for side in (1.0, -1.0))
     return np.asarray((ahead - behind) / (2.0 * STEP))
 
@@ -91,38 +82,38 @@ class Misses:
     """Misses of the emulator in one condition."""
 
     x: np.ndarray
-    """Points, each once, (n, parameters)."""
+    """Distinct points, (n, parameters)."""
     missed: np.ndarray
     noise: np.ndarray
     """Mean of its runs less the emulated, and the variance of its noise, (n, observables)."""
     slopes: np.ndarray
     """Change of the emulated by a shift of each parameter, (parameters, n, observables)."""
     correlation: np.ndarray
-    """Of the noise, (observables, observables)."""
+    """Correlation of the noise, (observables, observables)."""
     coefficients: np.ndarray
     chance: np.ndarray
-    """Covariances of the emulator's errors, and those that noise gives it, (observables, terms, terms)."""
+    """Covariances of the emulator's errors, and their part due to noise, (observables, terms, terms)."""
     misfit: np.ndarray
     variance: np.ndarray
-    """Its statement of what no coefficient follows, and variance of one run, both where symmetry lets it act,
+    """Stated variance beyond all coefficients, and variance of one run, both where symmetry allows an effect,
     (observables,)."""
     factors: int
-    """Number of the factors; the other parameters are sizes."""
+    """Number of factors; the other parameters are sizes."""
 
     def prior(self, amplitude: float) -> Prior:
-        """Knowledge without the runs."""
-        # Sizes run from 0 to 1, factors from -1 to 1.
+        """Return the knowledge without the runs."""
+        # sizes are 0 to 1, factors -1 to 1
         length = np.where(np.arange(self.x.shape[1]) < self.factors, LENGTH, LENGTH / 2.0)
         smooth = self.misfit + amplitude * self.variance
         return Prior(self.factors, self.coefficients, self.chance, smooth, length)
 
     def log_likelihood(self, amplitude: float) -> float:
-        """Of what was missed."""
+        """Return the log-likelihood of the misses."""
         return log_likelihood(self.prior(amplitude), self.x, self.missed, self.noise)
 
     @property
     def whitened(self) -> tuple[np.ndarray, np.ndarray]:
-        """Misses (n, observables) and slopes in deviations of the noise and of what the bank leaves open.
+        """Misses (n, observables) and slopes, whitened by the noise and the errors that the bank leaves.
 
         Errors of two observables are taken as correlated as their noise.
         """
@@ -134,19 +125,7 @@ class Misses:
 
 
 def misses(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray, condition: str) -> Misses:
-    """Collect the misses of a model in one condition.
-
-    Parameters
-    ----------
-    model : Model
-        Shifted, not corrected.
-    runs : Runs
-    centre : (parameters,) array
-        Where noise and errors are taken.
-    ratio : (observables,) array
-        Variance of one run over the emulator's.
-    condition : str
-    """
+    """Collect the misses of a shifted, uncorrected model in one condition (`likeliest_shift`)."""
     here = runs.conditions == condition
     surfaces, factors = model.emulator.surfaces[condition], len(model.emulator.space.factors)
     x, groups, counts = np.unique(runs.x[here], axis=0, return_inverse=True, return_counts=True)
@@ -167,12 +146,11 @@ def misses(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray, cond
     )
 
 
-def beside_the_bank(shift: Shift, seen: Sequence[Misses], model: Model) -> Shift:
-    """Find a shift again beside what the bank leaves open of the emulator, linearised at the first.
+def with_bank_errors(shift: Shift, seen: Sequence[Misses], model: Model) -> Shift:
+    """Find a shift again with the errors that the bank leaves in the emulator, linearised at the first.
 
-    Beside noise alone it takes up errors of the coefficients, and is stated too well: 83 % of 600 intervals
-    of 90 % held the size in emulated twins with a small bank, 89 % of 560 with a large one. A smooth function
-    has no part in it: what it would leave open of the shift, it corrects around the optimum.
+    With the noise alone it takes up errors of the coefficients, and its error is understated
+    (``trials/record/intervals``). The smooth function has no part in it: it corrects around the optimum.
     """
     precision = _precision(model)
     normal, descent = np.diag(precision), -precision * shift.value
@@ -185,5 +163,5 @@ def beside_the_bank(shift: Shift, seen: Sequence[Misses], model: Model) -> Shift
 
 
 def _precision(model: Model) -> np.ndarray:
-    """Prior precision of a shift, (parameters,)."""
+    """Return the prior precision of a shift, (parameters,)."""
     return np.asarray((SHIFT_SD * (model.upper - model.lower)) ** -2.0)

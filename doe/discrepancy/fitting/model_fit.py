@@ -1,6 +1,4 @@
-"""Fits of models to means: bounded least squares, many at once, and what they say of the parameters."""
-
-from __future__ import annotations
+"""Fits of models to means: bounded least squares, many at once, with the errors of the parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,34 +12,34 @@ from doe.discrepancy.fitting.fitted_model import STEP, Model, Stack
 
 ITERATIONS = 40
 SCOUTING = 6
-"""Steps after which only the best starts go on."""
-GLIMPSED = (0.3, 0.8)
-"""Coded sizes that a first look starts from."""
+"""Steps after which only the best starts continue."""
+QUICK_SIZES = (0.3, 0.8)
+"""Coded sizes from which a quick fit starts."""
 FINALISTS = 3
-"""Starts that go on, each with the weights of where it is."""
+"""Number of starts that continue, each with its own weights."""
 DEEPEST = 10.0
-"""Fall of the score that a descent may bring: the best goes down to the least, others if they may pass it."""
+"""Largest fall of the score in a descent: others than the best start are descended only within it."""
 APART = 0.1
-"""Starts that have come nearer to each other than this, in coded units, are one."""
+"""Distance of starts in coded units below which they are the same."""
 DESCENTS = 12
-"""Most steps down the score."""
+"""Largest number of steps down the score."""
 ARRIVED = 0.01
-"""Fall of the score that a last step brings: its noise is a hundred times as large."""
+"""Fall of the score in the last step; its noise is a hundred times as large."""
 TURNS = (30.0, 60.0, 90.0, -30.0, -60.0, -90.0)
-"""Azimuths about one of the two sides that are tried [deg]: between two, a cosine changes by half at most."""
+"""Azimuths about one of the two sides that are tried [deg]: between two, a cosine changes by at most half."""
 TURNED = 6.63
-"""Fall of the score that chance brings by one more parameter in one case of a hundred."""
+"""Fall of the score by one more parameter that chance reaches in one case of a hundred."""
 CONVERGED = 1e-4
-"""Longest step of a fit that has arrived, in coded units."""
+"""Longest last step of a converged fit, in coded units."""
 AT_BOUND = 1e-3
-"""A parameter so near an end of its range, in coded units, is at that end."""
+"""Distance from an end of a range, in coded units, below which a parameter is at that end."""
 LEAST_INFORMATION = 1e-9
-"""Of a parameter that no mean depends on; its range is worth a millionfold."""
+"""Information on a parameter that no mean depends on; its range has a million times as much."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """An estimate with the ends of its 90 % interval."""
+    """Estimate with the ends of its 90 % interval."""
 
     low: float
     value: float
@@ -50,15 +48,15 @@ class Interval:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A model at its optimum."""
+    """Model at its optimum."""
 
     stack: Stack
     x: np.ndarray
-    """Coded, (parameters,)."""
+    """Coded parameters, (parameters,)."""
     covariance: np.ndarray
-    """Of measured less predicted means, which the fit was weighted with, (means, means)."""
+    """Covariance of measured less predicted means, which gave the weights, (means, means)."""
     whitening: np.ndarray
-    """W with W' W its inverse, (means, means)."""
+    """Matrix W with W' W the inverse of the covariance, (means, means)."""
     q: float
     """Sum of squares of the whitened residuals."""
     score: float
@@ -71,10 +69,7 @@ class Fitted:
 
     @cached_property
     def spread(self) -> np.ndarray:
-        """Covariance of the parameters if slopes and the model's shift were known, (parameters, parameters).
-
-        The ranges are what is known of a parameter that the data say nothing of.
-        """
+        """Covariance of the parameters for known slopes and shift, with the ranges as prior."""
         information = self.slopes.T @ self.slopes + np.diag(model_width(self.model) ** -2)
         return np.asarray(np.linalg.inv(information))
 
@@ -82,9 +77,9 @@ class Fitted:
     def whole_spread(self) -> np.ndarray:
         """Covariance of the parameters, (parameters, parameters).
 
-        Slopes are less than they seem by the noise in them, and a direction that they say no more of than
-        noise would is as open as its range. An error of the model's shift moves the optimum by what the
-        corrections leave of it.
+        Noise in the slopes makes them seem too large, and a direction without more information than noise is
+        as open as its range. An error of the model's shift moves the optimum as far as the corrections leave
+        it.
         """
         precision = self.whitening.T @ self.whitening
         seeming, feigned = self.slopes.T @ self.slopes, self.stack.feigned_information(self.x, precision)
@@ -111,14 +106,14 @@ class Fitted:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Coded sizes over the standard errors that they would have if there were none."""
+        """Coded sizes over the standard errors that absent mechanisms would have."""
         return np.asarray(self.coded_sizes / self.null_size_errors)
 
     @property
     def null_size_errors(self) -> np.ndarray:
-        """Standard errors that coded sizes would have if there were none.
+        """Standard errors of the coded sizes of absent mechanisms.
 
-        Noise in the slopes of an effect moves nothing where the effect is nothing.
+        Noise in the slopes of an effect moves nothing where the effect is zero.
         """
         shift, start = self.model.shift, len(self.x) - len(self.mechanisms)
         variances = np.diag(self.spread if shift is None else self.spread + shift.spread)
@@ -136,7 +131,7 @@ class Fitted:
 
     @property
     def promise(self) -> float:
-        """Score that it would have if all that is uncertain of its predictions were known, and q as it is."""
+        """Score with certain predictions and the same q."""
         certain = np.linalg.slogdet(self.stack.noise(self.x))[1]
         return self.score - float(np.linalg.slogdet(self.covariance)[1] - certain)
 
@@ -152,7 +147,7 @@ class Fitted:
 
     @property
     def sensitivities(self) -> np.ndarray:
-        """Whitened derivatives by the parameters that are not at an end of their range, (means, free)."""
+        """Whitened derivatives by the parameters inside their range, (means, free)."""
         free = (self.x > self.model.lower + AT_BOUND) & (self.x < self.model.upper - AT_BOUND)
         return self.slopes[:, free]
 
@@ -166,24 +161,10 @@ def minimise(
     upper: np.ndarray,
     iterations: int = ITERATIONS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Least squares within bounds from many starts at once (Levenberg and Marquardt, active bounds frozen).
+    """Minimise least squares within bounds from many starts (n, parameters) at once; return x and q.
 
-    Parameters
-    ----------
-    stack : Stack
-    whitening : (means, means) or (n, means, means) array
-    target : (means,) or (n, means) array
-        Of all, or of each.
-    starts : (n, parameters) array
-    lower, upper : (parameters,) or (n, parameters) array
-        Equal ends fix a parameter.
-    iterations : int
-        Most steps.
-
-    Returns
-    -------
-    x : (n, parameters) array
-    q : (n,) array
+    The method is that of Levenberg and Marquardt, with active bounds frozen. Weights, target and bounds are
+    those of all starts, or of each; equal bounds fix a parameter.
     """
     x = np.clip(starts, lower, upper)
     damping = np.full(len(x), 1e-2)
@@ -214,24 +195,17 @@ def minimise(
 
 
 def _whitened(whitening: np.ndarray, residuals: np.ndarray) -> np.ndarray:
-    """Whiten residuals (n, means), all alike or each by its own, (n, means)."""
+    """Whiten residuals (n, means), all alike or each by its own matrix, (n, means)."""
     return np.asarray((whitening @ residuals[:, :, None])[:, :, 0])
 
 
 def fit(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitted:
-    """Calibrate a model: the least score, from several starts.
+    """Calibrate a model: find the least score from several starts.
 
-    The weights change with the parameters, so that sums of squares of different places do not compare, and
-    under the weights of one place every other is behind. A direction is looked for at azimuth 0 and from
-    behind, and at others where that lowers the score by `TURNED`.
-
-    Parameters
-    ----------
-    stack : Stack
-    starts : (n, parameters) array, optional
-        Coded parameters to start from as well.
-    count : int
-        Sobol points to start from.
+    Given starts (n, parameters) are coded and additional to ``count`` Sobol points. The weights change with
+    the parameters, so sums of squares of different places do not compare, and under the weights of one place
+    every other is behind. A direction is searched at azimuth 0 and from behind, and at others where that
+    lowers the score by `TURNED`.
     """
     lower, upper = stack.model.lower, stack.model.upper
     tried = [stack.model.start[None], lower + sobol_points(count, len(lower), 0) * (upper - lower)]
@@ -269,12 +243,12 @@ def _least(stacks: Sequence[Stack], starts: np.ndarray) -> Fitted:
     return min([best, *map(_descend, near_it)], key=lambda each: each.score)
 
 
-def glimpse(stack: Stack, x: np.ndarray) -> float:
-    """Find about the least q of a model in a few steps from a fitted smaller one, its sizes small or large.
+def quick_q(stack: Stack, x: np.ndarray) -> float:
+    """Return roughly the least q of a model, in a few steps from a fitted smaller one.
 
-    The weights stay those of where it starts.
+    The sizes start small or large; the weights stay those of the start.
     """
-    starts = np.array([np.append(x, np.full(len(stack.model.mechanisms), size)) for size in GLIMPSED])
+    starts = np.array([np.append(x, np.full(len(stack.model.mechanisms), size)) for size in QUICK_SIZES])
     facing = [_facing(stack, each) for each in (0.0, 180.0)] if stack.model.is_directed else [stack]
     lower, upper = stack.model.lower, stack.model.upper
     whitening = whiten(stack.covariance(starts[0]))
@@ -299,7 +273,7 @@ def _turned(best: Fitted) -> Fitted:
 
 
 def _best_apart(tried: Sequence[Fitted]) -> list[Fitted]:
-    """Pick those of the best scores that are not near a better one."""
+    """Return the best fits that are not near a better one."""
     chosen: list[Fitted] = []
     for one in sorted(tried, key=lambda each: each.score):
         if all(one.stack is not each.stack or np.abs(one.x - each.x).max() > APART for each in chosen):
@@ -308,7 +282,7 @@ def _best_apart(tried: Sequence[Fitted]) -> list[Fitted]:
 
 
 def _descend(fitted: Fitted) -> Fitted:
-    """Go down the score by Fisher's scoring within bounds, the covariance changing with the point."""
+    """Go down the score by Fisher's scoring within bounds, with the covariance of each point."""
     stack, lower, upper = fitted.stack, fitted.model.lower, fitted.model.upper
     for _ in range(DESCENTS):
         slope, information = _score_slope(fitted)
@@ -327,9 +301,9 @@ def _descend(fitted: Fitted) -> Fitted:
 
 
 def _score_slope(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of half the score by the parameters, and their information, (p,), (p, p).
+    """Return derivatives of half the score by the parameters, and their information, (p,), (p, p).
 
-    Of a normal law with mean m(x) and covariance C(x): -m' C^-1 r + tr(C^-1 C') / 2 - r' C^-1 C' C^-1 r / 2,
+    A normal law of mean m(x) and covariance C(x) has -m' C^-1 r + tr(C^-1 C') / 2 - r' C^-1 C' C^-1 r / 2,
     and m' C^-1 m' + tr(C^-1 C' C^-1 C') / 2.
     """
     stack, whitening, residual, slopes = fitted.stack, fitted.whitening, fitted.residuals, fitted.slopes
@@ -356,7 +330,7 @@ def weigh(stack: Stack, x: np.ndarray) -> Fitted:
 
 
 def _left(seeming: np.ndarray, feigned: np.ndarray) -> np.ndarray:
-    """Take feigned information out of what seems to be there; no direction keeps less than none."""
+    """Subtract spurious information from the apparent one; no direction falls below zero."""
     triangle = np.linalg.cholesky(seeming + LEAST_INFORMATION * np.eye(len(seeming)))
     inverse = np.linalg.inv(triangle)
     shares, directions = np.linalg.eigh(inverse @ feigned @ inverse.T)
@@ -365,11 +339,11 @@ def _left(seeming: np.ndarray, feigned: np.ndarray) -> np.ndarray:
 
 
 def model_width(model: Model) -> np.ndarray:
-    """Widths of the coded ranges, (parameters,)."""
+    """Return the widths of the coded ranges, (parameters,)."""
     return np.asarray(model.upper - model.lower)
 
 
 def whiten(covariance: np.ndarray) -> np.ndarray:
-    """Lower triangle W with W' W the inverse of a covariance."""
+    """Return the lower triangle W with W' W the inverse of a covariance."""
     triangle = cholesky(covariance, lower=True)
     return np.asarray(solve_triangular(triangle, np.eye(len(triangle)), lower=True))

@@ -1,11 +1,9 @@
 """Fresh runs around an optimum, and the model that they correct.
 
-An emulator of the whole range is never quite right at the optimum, and of two mechanisms together it knows
-only the sum. Fresh runs show what it misses there (`misses`): a shift of its parameters, errors of its
-coefficients, as large as it states them, and a smooth function, as large as makes the runs most likely.
+An emulator of the whole range errs at the optimum, and it knows only the sum of two mechanisms. Fresh runs
+show its misses there (`misses`): a shift of its parameters, errors of its coefficients, as large as it states
+them, and a smooth function, as large as makes the runs most likely.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,24 +15,24 @@ from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.emulation.correction import condition_on
 from doe.discrepancy.emulation.run_noise import repeat_deviations
 from doe.discrepancy.fitting.fitted_model import Model
-from doe.discrepancy.fitting.misses import AMPLITUDES, Runs, beside_the_bank, likeliest_shift, misses
+from doe.discrepancy.fitting.misses import AMPLITUDES, Runs, likeliest_shift, misses, with_bank_errors
 from doe.discrepancy.fitting.model_fit import Fitted
 
 NOISE_WEIGHT = 20.0
-"""Weight of the bank's noise beside the scatter of fresh repeats, in repeats."""
+"""Weight of the bank's noise against the scatter of fresh repeats, in repeats."""
 SPREAD_RANGE = (0.12, 0.3)
 """Least and largest standard deviation of the fresh points, in coded units."""
 MOVED = 1.5
-"""An optimum that has moved by more of those standard deviations is simulated again."""
+"""Distance of an optimum in those standard deviations from which on it is simulated again."""
 
 
 def point_spread(fitted: Fitted) -> np.ndarray:
-    """Standard deviations that fresh points have around an optimum, (parameters,)."""
+    """Return the standard deviations of fresh points around an optimum, (parameters,)."""
     return np.sqrt(np.diag(fitted.spread)).clip(*SPREAD_RANGE)
 
 
 def points_around(fitted: Fitted, count: int, seed: int) -> np.ndarray:
-    """Normal Sobol points around an optimum as uncertain as the fit, the first at it, (count, parameters)."""
+    """Return normal Sobol points around an optimum, as uncertain as the fit; the first is the optimum."""
     normal = stats.norm.ppf(sobol_points(count, len(fitted.x), seed).clip(0.01, 0.99))
     sd = np.sqrt(np.diag(fitted.spread))
     triangle = np.linalg.cholesky(fitted.spread / np.outer(sd, sd) + 1e-9 * np.eye(len(sd)))
@@ -44,26 +42,18 @@ def points_around(fitted: Fitted, count: int, seed: int) -> np.ndarray:
 
 
 def has_moved(fitted: Fitted, centre: np.ndarray) -> bool:
-    """Say if an optimum lies outside the fresh points around a centre."""
+    """Return True if an optimum is outside the fresh points around a centre."""
     return bool((np.abs(fitted.x - centre) > MOVED * point_spread(fitted)).any())
 
 
 def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
-    """Correct a model by fresh runs.
-
-    Parameters
-    ----------
-    model : Model
-    runs : Runs
-    centre : (parameters,) array
-        Optimum that they lie around.
-    """
+    """Correct a model by fresh runs around an optimum, the centre (parameters,)."""
     plain = replace(model, shift=None, corrections={}, heading=0.0, views={})  # as runs are
     names = [c for c in model.emulator.surfaces if np.sum(runs.conditions == c) >= 2]
     ratio = _noise_ratio(plain, runs, names)
     shift = likeliest_shift(plain, runs, centre, ratio)
     moved = replace(plain, shift=shift)
-    shift = beside_the_bank(shift, [misses(moved, runs, centre, ratio, name) for name in names], plain)
+    shift = with_bank_errors(shift, [misses(moved, runs, centre, ratio, name) for name in names], plain)
     shifted = replace(plain, shift=shift)
     seen = {name: misses(shifted, runs, centre, ratio, name) for name in names}
     amplitude = max(AMPLITUDES, key=lambda tried: sum(one.log_likelihood(tried) for one in seen.values()))
@@ -83,7 +73,7 @@ def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
 
 
 def _noise_ratio(model: Model, runs: Runs, conditions: Sequence[str]) -> np.ndarray:
-    """Variance of fresh repeats over the emulator's, pooled over conditions, (observables,)."""
+    """Return the variance of fresh repeats over the emulator's, pooled over conditions, (observables,)."""
     total, count = np.full(len(model.emulator.observables), NOISE_WEIGHT), NOISE_WEIGHT
     for name in conditions:
         here = np.flatnonzero(runs.conditions == name)

@@ -1,7 +1,7 @@
-"""Scatter of measured replicates beside that of the model: of the runs themselves, and of their readings.
+"""Scatter of measured replicates beyond that of the model: of the runs themselves, and of their readings.
 
-Observables of one run scatter together, as the model's do. Readings err each by itself. So of what replicates
-scatter beyond the model, the part that keeps its correlations is the runs', and the rest is the readings'.
+Observables of one run scatter together, as the model's do. Errors of readings are independent. So the part of
+the excess scatter that keeps the model's correlations is due to the runs, and the rest to the readings.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ class Scatter:
     """Deviations of the replicates of all conditions from their means."""
 
     products: Mapping[str, np.ndarray]
-    """By condition: sums of the products of two observables' deviations, over the replicates that have both,
+    """Sums of the products of two observables' deviations by condition, over the replicates that have both,
     (observables, observables)."""
     freedom: Mapping[str, np.ndarray]
-    """Degrees of freedom of those sums."""
+    """Degrees of freedom of those sums by condition."""
 
     @classmethod
     def of(cls, measured: Measured, observables: Sequence[str], conditions: Sequence[str]) -> Scatter:
-        """Collect those of some conditions; an observable that was not measured has no degrees of freedom."""
+        """Collect the scatter of some conditions; unmeasured observables have no degrees of freedom."""
         own = [measured.observables.index(name) for name in observables if name in measured.observables]
         at = [column for column, name in enumerate(observables) if name in measured.observables]
         products, freedom = {}, {}
@@ -42,25 +42,14 @@ class Scatter:
         return cls(products, freedom)
 
     def excess(self, covariances: Mapping[str, np.ndarray], known: float, size: int) -> Excess:
-        """Estimate what the replicates scatter more than a model.
+        """Estimate the scatter of the replicates beyond that of a model.
 
-        In standard deviations of the model the mean product of the deviations of two observables is
-
-            M_ij = h R_ij + d_ij r_i,
-
-        R being the model's correlation: h comes from the products of different observables, r from what it
-        leaves of the squares. h and the mean of all r are as much nearer to nothing as their standard errors
-        make them (James and Stein 1961, positive part), each r nearer to that mean (Efron and Morris 1973).
-        Less scatter than the model's is chance.
-
-        Parameters
-        ----------
-        covariances : mapping
-            By condition, that of one run of the model, (observables, observables).
-        known : float
-            Degrees of freedom that it comes from.
-        size : int
-            Number of the observables.
+        In standard deviations of the model the mean product of the deviations of two observables is M_ij = h
+        R_ij + d_ij r_i with the model's correlation R: h comes from the products of different observables, r
+        from the remainder of the squares. h and the mean of all r are shrunk to zero by their standard errors
+        (James and Stein 1961, positive part), each r to that mean (Efron and Morris 1973). Less scatter than
+        the model's is chance. ``known`` is the number of degrees of freedom of the model's covariances,
+        ``size`` that of observables.
         """
         moments, likeness, freedom = np.zeros((3, size, size))
         for condition, products in self.products.items():
@@ -84,28 +73,28 @@ class Excess:
     """Scatter of replicates in variances of one run of a model."""
 
     runs: float
-    """Of the runs, with the model's correlations; 1: as the model's."""
+    """Scatter of the runs, with the model's correlations; 1: equal to the model's."""
     reading: np.ndarray
-    """Of the readings, each by itself; 0: none, (observables,)."""
+    """Independent scatter of the readings, (observables,)."""
 
     @property
     def ratio(self) -> np.ndarray:
-        """Standard deviation of one replicate in that of one run, (observables,)."""
+        """Standard deviation of one replicate over that of one run, (observables,)."""
         return np.asarray(np.sqrt(self.runs + self.reading))
 
     def added_to(self, covariance: np.ndarray) -> np.ndarray:
-        """Covariance of one replicate, of that of one run, (observables, observables)."""
+        """Return the covariance of one replicate from that of one run, (observables, observables)."""
         return self.runs * covariance + np.diag(self.reading * np.diag(covariance))
 
 
 NOTHING = Scatter({}, {})
-"""Replicates of which none is known."""
+"""Scatter without replicates."""
 
 
 def _parted(
     moments: np.ndarray, correlation: np.ndarray, freedom: np.ndarray, known: float
 ) -> tuple[float, np.ndarray]:
-    """Part mean products of deviations (n, n) as `Scatter.excess` says, into h and r (n,)."""
+    """Split mean products of deviations (n, n) into h and r (n,) (`Scatter.excess`)."""
     error = 1.0 / np.maximum(freedom, 1.0) + 1.0 / known
     others = correlation * (1.0 - np.eye(len(moments))) * freedom
     length = float(np.sum(others * correlation))
@@ -123,12 +112,12 @@ def _parted(
     total = float(np.sum(moments**2 * error)) * 2.0 / len(raw) ** 2
     between = max(float(np.mean((raw - mean) ** 2 - errors)), 0.0)
     spread = between + errors
-    # what has no scatter at all is known without error
+    # an observable without scatter is known without error
     own = np.divide(between, spread, out=np.zeros_like(spread), where=spread > 0.0)
     centre = _drawn(mean, total)
     return runs, np.maximum(centre + own * (raw - centre), 0.0)
 
 
 def _drawn(value: float, variance: float) -> float:
-    """Draw an estimate towards nothing; what is below its standard error is nothing."""
+    """Shrink an estimate towards zero; below its standard error it is zero."""
     return max(value - variance / value, 0.0) if value > 0.0 else 0.0

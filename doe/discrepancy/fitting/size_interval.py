@@ -1,7 +1,5 @@
 """Intervals of the sizes of mechanisms, from the profile of the likelihood."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import stats
 
@@ -11,21 +9,13 @@ PROFILE_POINTS = 61
 
 
 def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> tuple[float, float]:
-    """Profile-likelihood interval of a coded size.
+    """Return the profile-likelihood interval of a coded size, by the number of its mechanism.
 
     It ends where q, with all else refitted, has risen by the point of chi2 for the coverage. The weights stay
-    those of the optimum; what they contribute to the score's slope there is taken out of the residuals, so
-    that q is least at the optimum, too. An error that noise in the slopes makes grows with the size, as an
-    error of the divisor does in a quotient (Fieller 1954): it opens no way to the null. Where nothing fits,
-    the score may ask for another size than q does, one whose predictions are more uncertain: the interval
-    holds both.
-
-    Parameters
-    ----------
-    fitted : Fitted
-    number : int
-        Which of the model's mechanisms.
-    coverage : float
+    those of the optimum; their contribution to the score's slope there is taken out of the residuals, so that
+    q is least at the optimum, too. An error due to noise in the slopes grows with the size, as an error of
+    the divisor does in a quotient (Fieller 1954): it opens no way to the null. Where nothing fits, the score
+    may prefer another size than q, one whose predictions are more uncertain: the interval holds both.
     """
     column = len(fitted.x) - len(fitted.mechanisms) + number
     se = max(float(fitted.coded_size_errors[number]), 1e-3)
@@ -48,7 +38,7 @@ def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> t
 
 
 def _variances(fitted: Fitted, number: int, sizes: np.ndarray) -> np.ndarray:
-    """Variances of the error of a coded size, if it were one of these."""
+    """Return the variances of the error of a coded size, if it were one of these sizes."""
     value, whole = fitted.coded_sizes[number], fitted.coded_size_errors[number] ** 2
     none = min(fitted.null_size_errors[number] ** 2, whole)
     return np.asarray(none + (whole - none) * (sizes / value if value > 0.0 else 1.0) ** 2)

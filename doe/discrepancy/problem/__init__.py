@@ -1,1 +1,1 @@
-"""Input of an analysis: what may vary, measured replicates, the rules, and whatever answers points."""
+"""Input of an analysis: ranges, measured replicates, rules, and the simulator."""

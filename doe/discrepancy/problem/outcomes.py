@@ -1,10 +1,8 @@
 """The simulator as an analysis sees it: points in, observables out.
 
-A solver, an emulator and a table of finished runs all answer alike, so that the statistics never know which
-of them they talk to.
+A solver, an emulator and a table of finished runs have the same interface; the statistics never know which of
+them they use.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Point:
-    """One case: the parameters, the effects that are in the model, where it is tested, and the seed."""
+    """One case: parameters, active mechanisms, condition and seed."""
 
     theta: tuple[float, ...]
     """Values of the factors in natural units, in their order."""
@@ -32,10 +30,9 @@ class Outcomes:
     """Outcomes of a list of points, in their order."""
 
     values: np.ndarray
-    """Observables in their natural units; rows of cases that failed are NaN, and no one may read them, (n,
-    observables)."""
+    """Observables in their natural units, (n, observables); rows of failed cases are NaN."""
     reasons: tuple[str, ...]
-    """Reason of each case that failed; empty where it did not."""
+    """Reason of each failed case; empty for the others."""
 
     @property
     def finished(self) -> np.ndarray:
@@ -44,10 +41,10 @@ class Outcomes:
 
 
 class Simulator(Protocol):
-    """Anything that answers points with observables."""
+    """Callable that answers points with observables."""
 
     observables: tuple[str, ...]
     """Names of the columns of the outcomes."""
 
     def __call__(self, points: Sequence[Point]) -> Outcomes:
-        """Observables of every point; all of them at once."""
+        """Return the observables of every point, all of them at once."""

@@ -14,15 +14,15 @@ from doe.errors import RuleError
 
 @dataclass(frozen=True)
 class Calibration:
-    """Standard deviations of what may be off alike in every measurement of one observable."""
+    """Standard deviations of the calibration errors that all measurements of one observable share."""
 
     offset: float = 0.0
-    """Added to every value, in its natural unit."""
+    """Offset of every value, in its natural unit."""
     scale: float = 0.0
-    """Share of every value."""
+    """Relative error of every value."""
     instrument: str = ""
-    """Name of what it was measured by: all observables of one instrument have one error of scale, each by its
-    own standard deviation, as lengths that are read off one ruler; empty: the error is its own."""
+    """Name of the instrument: its observables share one error of scale, each by its own standard deviation,
+    e.g. lengths that are read off one ruler. Empty: the error is the observable's own."""
 
     def __post_init__(self) -> None:
         for name in ("offset", "scale"):
@@ -37,31 +37,31 @@ class Measured:
     conditions: tuple[str, ...]
     """Conditions with at least one replicate."""
     observables: tuple[str, ...]
-    """Columns of the values: what was measured in at least one replicate."""
+    """Columns of the values: observables measured in at least one replicate."""
     values: Mapping[str, np.ndarray]
-    """By condition; NaN where an observable was not measured, and everywhere in the row of a replicate that
-    failed, each (replicates, observables)."""
+    """Values by condition, each (replicates, observables); NaN where an observable was not measured, and in
+    the whole row of a failed replicate."""
     reasons: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """By condition: reason of each replicate that failed, empty where it did not; left out: none did."""
+    """Reason of each failed replicate by condition, empty for the others. Default: none failed."""
     pictures: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
-    """By condition: pictures that came with the data."""
+    """Pictures of the data by condition."""
     calibration: Mapping[str, Calibration] = field(default_factory=dict)
-    """By observable, what its instrument may be off by in all conditions; left out: nothing."""
+    """Calibration error by observable, the same in all conditions. Default: no error."""
     views: Mapping[str, float] = field(default_factory=dict)
-    """By condition: azimuth that it was seen from [deg]; left out: 0, as the simulator is."""
+    """Azimuth of the view by condition [deg]. Default: 0, as in the simulator."""
     kinds: tuple[tuple[str, ...], ...] = ()
-    """Observables that are measured in one unit, which a slip of units takes all together."""
+    """Observables measured in one unit, which a slip of units affects together."""
     notes: tuple[str, ...] = ()
-    """Remarks that a reader must know: too few replicates, values that contradict one another, ..."""
+    """Remarks for the reader: too few replicates, values that contradict one another, ..."""
 
     def __post_init__(self) -> None:
         for what, names in (("conditions", self.conditions), ("observables", self.observables)):
             if not names or len(set(names)) < len(names):
-                raise RuleError(f"Measured.{what}", "needs at least one, each once", names)
+                raise RuleError(f"Measured.{what}", "must be at least one, each once", names)
         if set(self.values) != set(self.conditions):
-            raise RuleError("Measured.values", "holds every condition and no other", sorted(self.values))
+            raise RuleError("Measured.values", "must be by condition, for all of them", sorted(self.values))
         if strange := [name for name in self.calibration if name not in self.observables]:
-            raise RuleError("Measured.calibration", "is of measured observables", strange)
+            raise RuleError("Measured.calibration", "must be of measured observables", strange)
         formed = {name: tuple("" for _ in rows) for name, rows in self.values.items()}
         object.__setattr__(self, "reasons", {**formed, **self.reasons})
         for name, rows in self.values.items():
@@ -70,35 +70,35 @@ class Measured:
     def _check(self, name: str, rows: np.ndarray) -> None:
         place = f"Measured.values[{name!r}]"
         if rows.ndim != 2 or len(rows) == 0 or rows.shape[1] != len(self.observables):
-            rule = f"is a row a replicate, with a column for each of {len(self.observables)} observables"
+            rule = f"must have a row per replicate and {len(self.observables)} columns, one per observable"
             raise RuleError(place, rule, f"shape {rows.shape}")
         if np.isinf(rows).any():
-            raise RuleError(place, "is finite, or NaN where nothing was measured", "an infinite value")
+            raise RuleError(place, "must be finite, or NaN where nothing was measured", "an infinite value")
         if len(self.reasons[name]) != len(rows):
-            rule = "has one entry a replicate, empty where it did not fail"
+            rule = "must have one entry per replicate, empty where it did not fail"
             raise RuleError(f"Measured.reasons[{name!r}]", rule, self.reasons[name])
         if np.isfinite(rows[[bool(reason) for reason in self.reasons[name]]]).any():
-            raise RuleError(place, "is NaN in the row of a replicate that failed", "a number")
+            raise RuleError(place, "must be NaN in the row of a failed replicate", "a number")
 
     def finished_count(self, condition: str) -> int:
-        """Replicates of a condition that did not fail."""
+        """Return the number of replicates of a condition that did not fail."""
         return sum(not reason for reason in self.reasons[condition])
 
     def counts(self, condition: str) -> np.ndarray:
-        """Replicates in which each observable was measured, (observables,)."""
+        """Return the number of replicates with each observable, (observables,)."""
         return np.isfinite(self.values[condition]).sum(axis=0)
 
     def mean(self, condition: str) -> np.ndarray:
-        """Mean of each observable over the replicates that have it, (observables,); NaN where none has."""
+        """Return the mean of each observable over the replicates that have it; NaN without replicates."""
         rows, counts = self.values[condition], self.counts(condition)
         sums = np.where(np.isfinite(rows), rows, 0.0).sum(axis=0)
         return np.divide(sums, counts, out=np.full(len(counts), np.nan), where=counts > 0)
 
     def covariance(self, condition: str) -> np.ndarray:
-        """Covariance of one replicate, (observables, observables), over the replicates that have both.
+        """Return the covariance of one replicate, (observables, observables).
 
-        s_ij = sum over those of (x_i - mean_i)(x_j - mean_j), over their number less 1, the means over the
-        same replicates; NaN where fewer than two have both.
+        s_ij = sum of (x_i - mean_i)(x_j - mean_j) over the replicates that have both, over their number less
+        1, with the means over the same replicates; NaN where fewer than two have both.
         """
         rows = self.values[condition]
         size = rows.shape[1]
@@ -112,12 +112,12 @@ class Measured:
         return covariance
 
     def only(self, observables: Iterable[str]) -> Measured:
-        """Keep some observables, in their order here; replicates stay, even those that have none left.
+        """Keep some observables, in their order here; all replicates stay.
 
         Raises
         ------
         RuleError
-            When none of them was measured.
+            None of them was measured.
         """
         wanted = set(observables)
         kept = [index for index, name in enumerate(self.observables) if name in wanted]

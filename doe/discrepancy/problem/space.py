@@ -1,8 +1,8 @@
-"""The space of a search: factors, sizes of mechanisms, conditions.
+"""Space of a search: factors, sizes of mechanisms, conditions.
 
 A size is in natural units; a coded size is 0 at the null and 1 at the maximum, and the effect grows evenly
-with it. Coded factors run from -1 to 1 over their range. A row of coded parameters is all factors, then the
-coded sizes of the mechanisms in the model.
+with it. Coded factors are -1 to 1 over their range. A row of coded parameters is all factors, then the coded
+sizes of the mechanisms in the model.
 """
 
 from __future__ import annotations
@@ -19,38 +19,38 @@ CODED_DIGITS = 9
 """Decimals of the coded parameters of a case."""
 
 LEAST_SATURATION = 0.01
-"""Least saturation, in ranges of sizes: below it all sizes but the smallest are one size."""
+"""Least saturation, in ranges of sizes: below it all sizes but the smallest are the same."""
 
 
 @dataclass(frozen=True)
 class MechanismRange:
-    """A mechanism of the library: something that the simulator can have beyond its base model."""
+    """A mechanism of the library: an effect that the simulator can have beyond its base model."""
 
     name: str
     null: float
     maximum: float
-    """Size at which it is absent, and the end of its range, in its natural units."""
+    """Size without effect, and the end of its range, in its natural unit."""
     directed: bool = False
-    """It has a direction, an azimuth; the simulator has it at azimuth 0."""
+    """True if it has a direction, an azimuth; the simulator has it at azimuth 0."""
     saturation: float | None = None
-    """Distance from the null over which what a step adds falls to 1/e; None: it adds the same all the way."""
+    """Distance from the null over which the effect of a step falls to 1/e; None: the same effect everywhere.
+    """
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.null) and math.isfinite(self.maximum)) or self.null == self.maximum:
-            raise RuleError(self.name, "needs a null and another maximum", (self.null, self.maximum))
+            raise RuleError(self.name, "must have a null and another maximum", (self.null, self.maximum))
         least = LEAST_SATURATION * abs(self.width)
         if self.saturation is not None and not least <= self.saturation < math.inf:
-            raise RuleError(
-                self.name, f"saturates over a hundredth of its range ({least:.6g}) at least", self.saturation
-            )
+            rule = f"must saturate over at least a hundredth of its range ({least:.6g})"
+            raise RuleError(self.name, rule, self.saturation)
 
     def coded(self, natural: float) -> float:
-        """Coded size of a size."""
+        """Return the coded size of a size."""
         share = (natural - self.null) / self.width
         return share if self.saturation is None else math.expm1(-share * self._fall) / math.expm1(-self._fall)
 
     def natural(self, coded: float) -> float:
-        """Size of a coded size."""
+        """Return the size of a coded size."""
         if self.saturation is None:
             return self.null + coded * self.width
         left = 1.0 + coded * math.expm1(-self._fall)
@@ -69,35 +69,33 @@ class MechanismRange:
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """Names and ranges of everything that may vary."""
+    """Names and ranges of factors, conditions and mechanisms."""
 
     factors: tuple[str, ...]
-    """Names of what every calibration adjusts."""
+    """Names of the parameters that every calibration adjusts."""
     lower: tuple[float, ...]
     upper: tuple[float, ...]
-    """Their ranges in natural units."""
+    """Ranges of the factors in natural units."""
     conditions: tuple[str, ...]
     held_out: tuple[bool, ...]
     """True where a condition takes no part in any fit."""
     mechanisms: tuple[MechanismRange, ...] = field(default=())
     """The library."""
     odd: tuple[str, ...] = field(default=())
-    """Observables that change their sign in a mirror which turns no condition, no factor and no mechanism but
-    the directed ones into another: without one of these they are nothing but noise."""
+    """Observables that change sign in a mirror which changes no condition, factor or mechanism except the
+    directed ones: without a directed mechanism they are noise only."""
 
     def __post_init__(self) -> None:
         if not len(self.factors) == len(self.lower) == len(self.upper) or not self.factors:
-            raise RuleError(
-                "SearchSpace.factors", "needs a range for each of at least one factor", self.factors
-            )
+            raise RuleError("SearchSpace.factors", "must be at least one, each with a range", self.factors)
         for name, low, high in zip(self.factors, self.lower, self.upper, strict=True):
             if not low < high:
-                raise RuleError(f"factor {name}", "must run from its lower to its upper end", (low, high))
+                raise RuleError(f"factor {name}", "must have a lower end below its upper end", (low, high))
         if len(self.held_out) != len(self.conditions) or all(self.held_out):
-            raise RuleError("SearchSpace.conditions", "needs at least one condition to fit", self.conditions)
+            raise RuleError("SearchSpace.conditions", "must have at least one to fit", self.conditions)
         names = [*self.conditions, *self.factors, *(m.name for m in self.mechanisms)]
         if len(set(names)) < len(names):
-            raise RuleError("conditions, factors and mechanisms of SearchSpace", "are named once each", names)
+            raise RuleError("SearchSpace", "must name each condition, factor and mechanism once", names)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -117,31 +115,31 @@ class SearchSpace:
         return replace(self, mechanisms=kept)
 
     def is_held_out(self, condition: str) -> bool:
-        """True if a condition takes no part in any fit."""
+        """Return True if a condition takes no part in any fit."""
         return self.held_out[self.conditions.index(condition)]
 
     def natural_theta(self, coded: np.ndarray) -> np.ndarray:
-        """Factors in natural units, same shape (..., factors)."""
+        """Return factors in natural units, same shape (..., factors)."""
         lower, upper = np.array(self.lower), np.array(self.upper)
         return lower + (np.asarray(coded) + 1.0) / 2.0 * (upper - lower)
 
     def coded_theta(self, natural: np.ndarray) -> np.ndarray:
-        """Factors in coded units, same shape (..., factors)."""
+        """Return factors in coded units, same shape (..., factors)."""
         lower, upper = np.array(self.lower), np.array(self.upper)
         return 2.0 * (np.asarray(natural) - lower) / (upper - lower) - 1.0
 
     def natural_size(self, name: str, coded: float) -> float:
-        """Size of a mechanism in its natural units."""
+        """Return a mechanism's size in its natural unit."""
         return self.mechanism(name).natural(float(coded))
 
     def coded_size(self, name: str, natural: float) -> float:
-        """Size of a mechanism in coded units."""
+        """Return a mechanism's size in coded units."""
         return self.mechanism(name).coded(natural)
 
     def point(self, coded: np.ndarray, mechanisms: tuple[str, ...], condition: str, seed: int) -> Point:
         """Return the case of one row of coded parameters.
 
-        Rounded, so that the last bits of a host's linear algebra make no other case.
+        They are rounded, so that the last bits of a host's linear algebra make no other case.
         """
         coded = np.round(coded, CODED_DIGITS)
         theta = self.natural_theta(coded[: len(self.factors)])

@@ -1,7 +1,5 @@
 """The gap before and after a mechanism was added, from fresh runs at both optima."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,9 +25,9 @@ class BeforeAfter:
     after: Interval
     """Q with the mechanism."""
     removed: Interval
-    """Share of the base's excess that is gone."""
+    """Removed share of the base's excess."""
     runs: int
-    """Fresh runs a model and condition."""
+    """Fresh runs per model and condition."""
 
 
 def compare(
@@ -42,26 +40,11 @@ def compare(
     draws: int,
     seed: int,
 ) -> BeforeAfter | None:
-    """Q of the means of fresh runs, without and with the mechanism, on some conditions.
+    """Return Q of the means of fresh runs at both optima, without and with the mechanism.
 
-    Both are measured against the same covariance, the chosen model's: what each disagrees by, not how it
-    scatters. The interval is over the noise of the measured and the simulated means.
-
-    Parameters
-    ----------
-    base, chosen : Fitted
-    base_runs, chosen_runs : Runs
-        At their optima.
-    blocks : sequence of Block
-    held_out : bool
-        What the blocks are; the expected Q of a true model is larger where its parameters come from
-        elsewhere.
-    draws, seed : int
-
-    Returns
-    -------
-    BeforeAfter or None
-        None where a condition has no data or fewer than two runs a model.
+    Both use the same covariance, the chosen model's: disagreement counts, not scatter. The interval is over
+    the noise of the measured and the simulated means. It is None where a condition has no data or fewer than
+    two runs per model.
     """
     kept = [
         b for b in blocks if all(np.sum(r.conditions == b.condition) >= 2 for r in (base_runs, chosen_runs))
@@ -81,7 +64,7 @@ def compare(
         qs.append((drawn**2).sum(axis=1))
     before, after = qs
     freedom = _expected(chosen, tuple(kept)) if held_out else max(size - len(chosen.x), 1)
-    # A noisy residual is larger by its noise on average: a second noise would count it twice.
+    # a noisy residual is larger by its noise on average: a second noise would count it twice
     before[1:] -= size
     after[1:] -= size
     excess_before = np.maximum(before - freedom, 1e-9)
@@ -92,14 +75,14 @@ def compare(
 
 
 def _expected(chosen: Fitted, blocks: tuple[Block, ...]) -> int:
-    """Q of a true model whose parameters come from other conditions: its means, and what their errors add."""
+    """Return the expected Q of a true model whose parameters come from other conditions."""
     stack = Stack(chosen.model, blocks)
     slopes = whiten(stack.covariance(chosen.x)) @ stack.jacobian(chosen.x[None])[0]
     return round(len(stack.target) + float(np.trace(slopes @ chosen.spread @ slopes.T)))
 
 
 def _means(runs: Runs, blocks: Sequence[Block], model: Model, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Means of runs in the conditions of blocks, and the covariance of their error."""
+    """Return means of runs in the conditions of blocks, and the covariance of their error."""
     means, errors = [], []
     for block in blocks:
         here = runs.values[runs.conditions == block.condition][:, block.columns]
@@ -109,7 +92,7 @@ def _means(runs: Runs, blocks: Sequence[Block], model: Model, x: np.ndarray) -> 
 
 
 def _interval(values: np.ndarray) -> Interval:
-    """The first value, between the quantiles of the others."""
+    """Return the first value, between the quantiles of the others."""
     low, high = np.quantile(values[1:], [(1.0 - COVERAGE) / 2.0, (1.0 + COVERAGE) / 2.0])
     value = float(values[0])
     return Interval(min(float(low), value), value, max(float(high), value))

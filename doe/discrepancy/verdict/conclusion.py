@@ -1,6 +1,4 @@
-"""The rules by which a mechanism is admitted, and the verdict that they give."""
-
-from __future__ import annotations
+"""Rules by which a mechanism is accepted, and the verdict from them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,7 +14,8 @@ from doe.discrepancy.verdict.before_after import BeforeAfter
 from doe.discrepancy.verdict.discovery import Verdict
 
 WORSE = 4.0
-"""Rise of the held-out Q of fresh runs with which a name is withdrawn: two standard deviations, squared."""
+"""Rise of the held-out Q of fresh runs with which a name is withdrawn: two standard deviations, squared
+(``trials/record/sixth``)."""
 
 LIKELIHOOD = "minus twice the log-likelihood, held-out conditions included"
 """Name of a score, in reasons."""
@@ -24,27 +23,27 @@ LIKELIHOOD = "minus twice the log-likelihood, held-out conditions included"
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """A candidate with everything that the rules look at."""
+    """A candidate with all inputs of the rules."""
 
     fitted: Fitted
     gap: GapTest
-    """Of all conditions with the candidate in the model, those held out by forecast."""
+    """Gap of all conditions with the candidate in the model, the held-out ones by forecast."""
     gain: Interval | None
-    """Of the held-out log score over the base."""
+    """Gain of the held-out log score over the base."""
     explained: float
-    """Share of the base's excess that it removes."""
+    """Removed share of the base's excess."""
     simulated: bool
-    """True if fresh runs around its optimum stand behind it."""
+    """True if it has fresh runs around its optimum."""
     declared: bool
-    """True if all its mechanisms may be named by what was declared."""
+    """True if the declaration allows all its mechanisms as names."""
     whole: Fitted
-    """The same, weighed on all conditions."""
+    """The same fit, weighed on all conditions."""
     apart: Mapping[str, float] = field(default_factory=dict)
-    """By other mechanism, how far in Q it was shown to be from a single one of its size."""
+    """Distance in Q by other mechanism, from a single one of its size."""
 
     @property
     def mechanisms(self) -> tuple[str, ...]:
-        """Its mechanisms."""
+        """Mechanisms of the candidate."""
         return self.fitted.mechanisms
 
     @property
@@ -54,7 +53,7 @@ class Assessment:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Each size over the standard error that it would have if there were none."""
+        """Sizes over the standard errors that absent mechanisms would have."""
         return self.fitted.ratios
 
 
@@ -66,18 +65,18 @@ class Conclusion:
     named: tuple[str, ...]
     reason: str
     chosen: int | None
-    """Number of the assessment whose model to go on with."""
+    """Number of the assessment whose model the analysis continues with."""
 
 
 def explained_share(base: GapTest, with_it: GapTest) -> float:
-    """Share of the base's excess of Q over its degrees of freedom that a model removes, at most 1."""
+    """Return the share of the base's excess of Q that a model removes, at most 1."""
     if base.excess <= 0.0:
         return 0.0
     return max(1.0 - with_it.excess / base.excess, 0.0)
 
 
 def objections(assessment: Assessment, settings: Settings) -> list[str]:
-    """Every rule that a candidate fails, as sentences, in the order of the rules."""
+    """Return every rule that a candidate fails, as sentences, in the order of the rules."""
     least = settings.least_ratio if len(assessment.mechanisms) == 1 else settings.pair_ratio
     ratio = float(assessment.ratios.min())
     gap, gain = assessment.gap, assessment.gain
@@ -98,14 +97,9 @@ def objections(assessment: Assessment, settings: Settings) -> list[str]:
 def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusion:
     """Choose among candidates of equally many mechanisms.
 
-    The one of the best score is named if it passes every rule, may be named, and no other is so close behind
-    that it stays open which of them it is. Single mechanisms so close are a tie if one of them passes. Of two
-    such pairs neither is named: where two pairs fit, so may what the library does not have.
-
-    Parameters
-    ----------
-    assessments : sequence of Assessment
-    settings : Settings
+    The one of the best score is named if it passes every rule, may be named, and no other is so close that it
+    is open which of them is right. Close single mechanisms are a tie if one of them passes. Close pairs are
+    not named: where two pairs fit, a mechanism outside the library may fit, too.
     """
     if not assessments:
         return Conclusion(Verdict.UNKNOWN, (), "nothing in the library could explain the gap", None)
@@ -113,7 +107,7 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
     best = assessments[order[0]]
     margin = settings.tie_margin
     sure = certain(best.whole)
-    # rivals that fit were run: of the others an emulator says little, and whatever is measured is within that
+    # rivals that fit were run; the emulator's error at the others is large
     known = [certain(one.whole) - sure if one.simulated else math.inf for one in assessments]
     by = [lag(one.score - best.score, at, margin) for one, at in zip(assessments, known, strict=True)]
     close = [i for i in order if _is_close(assessments[i], best, by[i], margin)]
@@ -132,30 +126,17 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
     if passing and best.declared:
         return _named(assessments, order[0], order[1:])
     if passing:
-        failed = ["it was declared that such data cannot tell it from others"]
+        failed = ["by declaration such data cannot distinguish it from others"]
     return Conclusion(Verdict.UNKNOWN, (), f"{_title(best)} comes closest, but {failed[0]}", None)
 
 
 def conclude_with_two(
     of_one: Conclusion, singles: Sequence[Assessment], pairs: Sequence[Assessment], settings: Settings
 ) -> tuple[Conclusion, list[Assessment]]:
-    """Conclude again once pairs were tried.
+    """Conclude again with pairs; return the conclusion, and the assessments that it counts among.
 
-    Where a single mechanism was chosen, a pair that passes every rule must be ahead of it by as much as tells
-    two models apart.
-
-    Parameters
-    ----------
-    of_one : Conclusion
-        Among the single mechanisms.
-    singles, pairs : sequence of Assessment
-    settings : Settings
-
-    Returns
-    -------
-    conclusion : Conclusion
-    assessments : list of Assessment
-        All that the conclusion counts among.
+    Where a single mechanism was chosen, a pair that passes every rule must be ahead of it by the distance
+    that distinguishes two models.
     """
     if of_one.chosen is not None:
         passing = [one.score for one in pairs if not objections(one, settings)]
@@ -173,9 +154,10 @@ def conclude_with_two(
 
 
 def closest_first(assessments: Sequence[Assessment], settings: Settings) -> list[Assessment]:
-    """Sort models none of which explains the gap: those with fresh runs first, each by their score.
+    """Sort models that do not explain the gap: those with fresh runs first, each by their score.
 
-    Of a pair the second effect must bring as much as tells two models apart: some always brings a little.
+    The second effect of a pair must gain the distance that distinguishes two models: any effect gains a
+    little.
     """
     margin = settings.tie_margin
     return sorted(assessments, key=lambda one: (not one.simulated, one.score + margin * len(one.mechanisms)))
@@ -184,7 +166,7 @@ def closest_first(assessments: Sequence[Assessment], settings: Settings) -> list
 def _unexplained(
     closest: Assessment, of_one: Conclusion, of_two: Conclusion, settings: Settings
 ) -> Conclusion:
-    """Conclude that nothing explains the gap, by what is held against the closest single model or pair."""
+    """Conclude that nothing explains the gap, by the objections to the closest single model or pair."""
     failed = objections(closest, settings)
     if failed:
         return Conclusion(Verdict.UNKNOWN, (), f"{_title(closest)} comes closest, but {failed[0]}", None)
@@ -197,11 +179,7 @@ def _is_close(one: Assessment, best: Assessment, behind: float, margin: float) -
 
 
 def withdrawn(conclusion: Conclusion, compared: Sequence[BeforeAfter]) -> Conclusion:
-    """Withdraw a name or a tie with which fresh runs predict held-out conditions worse than the base's do.
-
-    Of the 203 right names of the sixth blind trials the fresh runs of none came out worse by more than 3.1;
-    with the one tie where nothing was hidden, by 14.
-    """
+    """Withdraw a name or a tie whose fresh runs predict held-out conditions worse than the base's do."""
     for one in compared:
         if one.held_out and (worse := one.after.value - one.before.value) > WORSE:
             reason = (
@@ -231,17 +209,13 @@ def _answer(answer: Answer) -> str:
         Question.SIZE: "Q =",
         Question.FALL: f"{_spaced(answer.mechanism)} would lower Q by",
         Question.SCORES: "the squared scores sum to",
-        Question.COMMON: "what is off alike in all conditions has a sum of squares of",
+        Question.COMMON: "deviations common to all conditions have a sum of squares of",
     }[answer.question]
     return f"{statistic} {answer.value:.1f}, limit {answer.limit:.1f}"
 
 
 def open_pairs(close: Sequence[Assessment]) -> str:
-    """Say which pairs are open, and what is in all of them.
-
-    In the fourteenth blind trials six pairs that were hidden came out so, and nothing else; what the open
-    ones share was hidden in five.
-    """
+    """Describe the open pairs, and the mechanisms in all of them (``trials/record/fourteenth``)."""
     shared = set.intersection(*(set(one.mechanisms) for one in close))
     text = f"no one pair stands out: {', '.join(map(_title, close))}"
     return text + "".join(f"; {_spaced(name)} is in all of them" for name in sorted(shared))

@@ -1,7 +1,7 @@
-"""The record of an analysis: the verdict and every number that it rests on.
+"""The record of an analysis: the verdict and its numbers.
 
-Arrays over the data have one row a condition and one column an observable, in the order of ``Data``; NaN
-stands where nothing was measured (or, for p values, tested). Parameters and sizes are in natural units.
+Arrays over the data have one row per condition and one column per observable, in the order of ``Data``; NaN
+means not measured (or, for p values, not tested). Parameters and sizes are in natural units.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from doe.discrepancy.verdict.next_experiment import NextExperiment
 
 
 class Verdict(StrEnum):
-    """Endings of an analysis."""
+    """Verdict of an analysis."""
 
     NONE = "none"
-    """The calibrated model agrees with the data: nothing is missing that they could show."""
+    """The calibrated model agrees with the data: they show no missing effect."""
     NAMED = "named"
     """One mechanism, or one pair, explains the disagreement, and no other does."""
     TIE = "tie"
@@ -36,7 +36,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """The measured means that were compared with the model."""
+    """Measured means that were compared with the model."""
 
     conditions: tuple[str, ...]
     observables: tuple[str, ...]
@@ -45,19 +45,19 @@ class Data:
     """True where a condition took no part in any fit."""
     means: np.ndarray
     standard_errors: np.ndarray
-    """In natural units, (conditions, observables)."""
+    """Means and their standard errors in natural units, (conditions, observables)."""
     replicates: np.ndarray
-    """Measurements that each mean is made of, (conditions, observables)."""
+    """Number of measurements behind each mean, (conditions, observables)."""
 
 
 @dataclass(frozen=True)
 class CalibrationUse:
-    """The calibration error of one observable that a model asks for."""
+    """Calibration error of one observable that a model needs."""
 
     observable: str
     offset: float
     scale: float
-    """Standard deviations that were allowed: in its natural unit, and as a share of the value."""
+    """Declared standard deviations: in the natural unit, and as a share of the value."""
     used_offset: float
     used_scale: float
     """Likeliest values of both, measured less true."""
@@ -67,38 +67,38 @@ class CalibrationUse:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A model as close to the training conditions as it comes."""
+    """Model with its best fit to the training conditions."""
 
     mechanisms: tuple[str, ...]
     """Additions to the base; empty for the base itself."""
     theta: tuple[float, ...]
     theta_se: tuple[float, ...]
-    """The factors and their standard errors."""
+    """Factors and their standard errors."""
     sizes: tuple[Interval, ...]
     """Size of each mechanism."""
     at_bounds: tuple[str, ...]
-    """Factors and mechanisms that ended at an end of their range."""
+    """Factors and mechanisms at an end of their range."""
     q: float
     degrees_of_freedom: int
     q_limit: float
     p_value: float
-    """Sum of squares of the whitened residuals of all conditions (of those held out: by how far the forecast
-    misses them), its degrees of freedom, the point that the bootstrap exceeds at the level of the rules, and
-    the p value of the whole disagreement, of which Q is one part."""
+    """Sum of squares of the whitened residuals of all conditions (held-out ones: errors of the forecast), its
+    degrees of freedom, the point that the bootstrap exceeds at the level of the rules, and the p value of the
+    whole disagreement, of which Q is one part."""
     clearest: Answer
-    """Of the questions that the p value is made of, the one that noise alone answers so most seldom."""
+    """Answer with the smallest p value under noise alone."""
     predicted: np.ndarray
     predicted_se: np.ndarray
-    """Means as the model has them, held-out conditions included, and how well they are known, (conditions,
-    observables)."""
+    """Means by the model, held-out conditions included, and their standard errors, (conditions, observables).
+    """
     residuals: np.ndarray
     adjusted_p: np.ndarray
     """Measured less predicted over the standard deviation of that difference, and its p value after Holm,
     (conditions, observables)."""
     calibration: tuple[CalibrationUse, ...] = ()
-    """Calibration errors that were allowed, and how much of each it uses."""
+    """Declared calibration errors, and the used part of each."""
     heading: float | None = None
-    """Azimuth of its directed mechanisms [deg]; None without one."""
+    """Azimuth of its directed mechanisms [deg]; None without them."""
 
     @property
     def excess(self) -> float:
@@ -114,8 +114,7 @@ class Gap:
     """True if the base disagrees by its Q, by the largest drop, or by all its scores together."""
     largest_drop: float
     drop_limit: float
-    """Largest fall of Q that a mechanism of the library brings, and the point that 2.5 % of the bootstrap
-    exceeds."""
+    """Largest fall of Q by a mechanism of the library, and the point that 2.5 % of the bootstrap exceeds."""
     drop_mechanism: str
     """The mechanism of that drop."""
 
@@ -129,7 +128,7 @@ class Drift:
     values: tuple[float, ...]
     standard_errors: tuple[float, ...]
     p_value: float
-    """Of the hypothesis that the values are one."""
+    """P value of the hypothesis that the values are equal."""
 
 
 @dataclass(frozen=True)
@@ -145,28 +144,28 @@ class Candidate:
     sizes: tuple[Interval, ...]
     """Size of each mechanism in the joint refit."""
     size_over_se: tuple[float, ...]
-    """Each size over the standard error that it would have if there were none."""
+    """Sizes over the standard errors that absent mechanisms would have."""
     q: float
     degrees_of_freedom: int
     p_value: float
-    """Of the joint refit, as in ``Fit``."""
+    """P value of the joint refit, as in ``Fit``."""
     explained: float
-    """Share of the base's excess that it removes."""
+    """Removed share of the base's excess."""
     held_out_gain: Interval | None
-    """Gain of the log score of the held-out conditions over the base; None where none was measured."""
+    """Gain of the log score of the held-out conditions over the base; None without such conditions."""
     simulated: bool
-    """True if these are figures of fresh runs around its optimum, False if the emulator's."""
+    """True if these are figures of fresh runs around its optimum, False if they are the emulator's."""
     admitted: bool
     """True if it passes every rule."""
     objection: str
     """The first rule that it fails, as a sentence; empty if admitted."""
     heading: float | None = None
-    """As in ``Fit``."""
+    """Azimuth of its directed mechanisms [deg]; None without them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Confounding:
-    """Likeness of mechanisms after calibration: correlations of their visible signatures."""
+    """Similarity of mechanisms after calibration: correlations of their visible signatures."""
 
     mechanisms: tuple[str, ...]
     correlations: np.ndarray
@@ -175,7 +174,7 @@ class Confounding:
 
 @dataclass(frozen=True)
 class Effort:
-    """Cost of the analysis, and what fixed it before the data were opened."""
+    """Cost of the analysis, and its settings before the data were opened."""
 
     seed: int
     settings_sha256: str
@@ -185,37 +184,37 @@ class Effort:
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """Everything that an analysis found."""
+    """Findings of an analysis."""
 
     verdict: Verdict
     reason: str
-    """The rule that gave the verdict, with its numbers, as a sentence."""
+    """Rule behind the verdict, with its numbers, as a sentence."""
     named: tuple[str, ...]
-    """The mechanisms of the verdict: one or two if named, all of them in a tie, else none."""
+    """Mechanisms of the verdict: one or two if named, all of them in a tie, else empty."""
     factors: tuple[str, ...]
     """Names of theta."""
     data: Data
-    base: Fit | None
-    chosen: Fit | None
-    """The calibrated base, and the model with the mechanism. None where there was nothing to fit; of a tie,
-    ``chosen`` is the one of lowest Q."""
-    gap: Gap | None
-    drifts: tuple[Drift, ...]
-    candidates: tuple[Candidate, ...]
-    """Best first."""
-    power: tuple[Power, ...]
-    """One a mechanism of the library."""
-    confounding: Confounding | None
-    before_after: tuple[BeforeAfter, ...]
-    """Training conditions, then held-out ones if measured; empty where no model was chosen."""
-    next_experiment: NextExperiment | None
     notes: tuple[str, ...]
-    """Faults of the data or the runs, and what was done about them."""
+    """Faults of the data or the runs, and their treatment."""
     effort: Effort
+    base: Fit | None = None
+    chosen: Fit | None = None
+    """Calibrated base, and model with the mechanism; None without a fit. In a tie, ``chosen`` has the lowest
+    Q."""
+    gap: Gap | None = None
+    drifts: tuple[Drift, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    """Best first."""
+    power: tuple[Power, ...] = ()
+    """Power for each mechanism of the library."""
+    confounding: Confounding | None = None
+    before_after: tuple[BeforeAfter, ...] = ()
+    """Training conditions, then held-out ones if measured; empty without a chosen model."""
+    next_experiment: NextExperiment | None = None
     closest: Fit | None = None
-    """The first of the candidates, where none was chosen."""
+    """First of the candidates, where no model was chosen."""
     slips: tuple[Slip, ...] = ()
-    """Likely slips, which this verdict was given with."""
+    """Likely slips in the data of this verdict."""
     without_slips: Discovery | None = None
     """The same analysis without their values; None without slips."""
 

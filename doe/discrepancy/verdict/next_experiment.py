@@ -1,6 +1,4 @@
-"""The experiment that would tell two models apart best (Hunter and Reiner 1965; Box and Hill 1967)."""
-
-from __future__ import annotations
+"""The experiment that distinguishes two models best (Hunter and Reiner 1965; Box and Hill 1967)."""
 
 from dataclasses import dataclass
 
@@ -14,11 +12,11 @@ from doe.discrepancy.fitting.model_fit import Fitted, whiten
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """The condition that would settle the verdict best."""
+    """Condition that would settle the verdict best."""
 
     condition: str
     changes: tuple[tuple[str, str], ...]
-    """Its settings that differ from the first: place and value."""
+    """Settings that differ from the first: place and value."""
     separates: tuple[str, str]
     """Two models, each a mechanism's name or "base"."""
     expected_q: float
@@ -27,39 +25,25 @@ class NextExperiment:
     observable: str
     """The observable that differs most."""
     wanted_q: float
-    """Q between the two that tells them apart."""
+    """Q between the two that distinguishes them."""
 
     @property
     def settles(self) -> bool:
-        """True if it can be expected to tell the two apart."""
+        """True if the experiment can be expected to distinguish the two."""
         return self.expected_q >= self.wanted_q
 
 
 TIMES = (1, 2, 4, 8)
-"""Multiples of the measured replicates that are tried: beyond them the emulator's error is what is left."""
+"""Multiples of the measured replicates that are tried: beyond them the emulator's error remains."""
 
 
 def propose(first: Fitted, second: Fitted, replicates: int, wanted_q: float) -> NextExperiment:
     """Choose the condition whose repetition separates two fitted models by most, the second refitted.
 
-    It is repeated as often as it was measured, or twice, four or eight times as often where only that tells
-    them apart.
-
-    The expected Q between them is that of the means that the first predicts, fitted by the second
-    (linearised) in the old conditions and the new one together.
-
-    Parameters
-    ----------
-    first, second : Fitted
-    replicates : int
-        Measurements of a condition so far.
-    wanted_q : float
-        Q between the two that tells them apart.
-
-    Returns
-    -------
-    NextExperiment
-        Without its ``changes``, which whoever defined the conditions knows.
+    It is repeated as often as it was measured, or two, four or eight times as often where only that
+    distinguishes them, i.e. where Q reaches ``wanted_q``. The expected Q is that of the means that the first
+    predicts, fitted by the second (linearised) in the old conditions and the new one together. ``changes``
+    stays empty: the caller defined the conditions.
     """
     tried = (_best(first, second, times * replicates, wanted_q) for times in TIMES)
     last = next(tried)
@@ -71,22 +55,19 @@ def propose(first: Fitted, second: Fitted, replicates: int, wanted_q: float) -> 
 
 
 def _best(first: Fitted, second: Fitted, replicates: int, wanted_q: float) -> NextExperiment:
-    """Choose the condition for so many measurements."""
-    emulator = first.model.emulator
-    best: tuple[float, str, str] | None = None
+    """Choose the condition for a number of measurements."""
+    emulator, tried = first.model.emulator, []
     for condition in emulator.space.conditions:
         block = Block.of_runs(condition, np.arange(len(emulator.observables)), replicates)
         expected, contrast = _separation(first, second, block)
-        if best is None or expected > best[0]:
-            best = (expected, condition, emulator.observables[int(np.argmax(np.abs(contrast)))])
-    if best is None:
-        raise ValueError(f"a next experiment needs a condition, got {emulator.space.conditions}")
+        tried.append((expected, condition, emulator.observables[int(np.argmax(np.abs(contrast)))]))
+    expected, condition, observable = max(tried, key=lambda one: one[0])
     titles = (_title(first), _title(second))
-    return NextExperiment(best[1], (), titles, best[0], replicates, best[2], wanted_q)
+    return NextExperiment(condition, (), titles, expected, replicates, observable, wanted_q)
 
 
 def _separation(first: Fitted, second: Fitted, block: Block) -> tuple[float, np.ndarray]:
-    """Expected Q, and the new condition's differences in standard deviations."""
+    """Return the expected Q, and the new condition's differences in standard deviations."""
     blocks = (*second.stack.blocks, block)
     stack = Stack(second.model, blocks)
     whitening = whiten(stack.covariance(second.x))

@@ -1,6 +1,4 @@
-"""From the arrays of an analysis to the records of a discovery, in natural units."""
-
-from __future__ import annotations
+"""Records of a discovery in natural units, from the arrays of an analysis."""
 
 import numpy as np
 from scipy import stats
@@ -18,12 +16,12 @@ from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.conclusion import Assessment, objections
 from doe.discrepancy.verdict.discovery import CalibrationUse, Candidate, Data, Drift, Fit
 
-TOLD = 1.5
-"""Variance of replicates over that of the model from which on the reader is told."""
+REPORTED = 1.5
+"""Variance of replicates over that of the model from which on a note reports it."""
 
 
 def data_record(emulator: Emulator, evidence: Evidence, base: Fitted | None = None) -> Data:
-    """The measured means, a row a condition of the emulator; their errors as the calibrated base has them."""
+    """Return the measured means, a row per condition of the emulator, with errors by the calibrated base."""
     conditions, observables = emulator.space.conditions, emulator.observables
     shape = (len(conditions), len(observables))
     means, errors, replicates = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=int)
@@ -39,7 +37,7 @@ def data_record(emulator: Emulator, evidence: Evidence, base: Fitted | None = No
 
 
 def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
-    """A calibrated model: parameters, predictions of every condition, residuals with Holm's p values."""
+    """Return a calibrated model: parameters, predictions of every condition, residuals with p values."""
     emulator = fitted.model.emulator
     space = emulator.space
     factors = len(space.factors)
@@ -71,7 +69,7 @@ def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
 
 
 def calibration_uses(fitted: Fitted, evidence: Evidence) -> tuple[CalibrationUse, ...]:
-    """Calibration errors that were allowed, each with its expected value given all residuals of a model."""
+    """Return declared calibration errors, each with its expected value given all residuals of a model."""
     whole = weigh(Stack(fitted.model, (*evidence.training, *evidence.held_out)), fitted.x)
     offsets, scales = (whole.stack.common @ whole.whitening.T @ whole.residuals).reshape(2, -1)
     observables = fitted.model.emulator.observables
@@ -82,7 +80,7 @@ def calibration_uses(fitted: Fitted, evidence: Evidence) -> tuple[CalibrationUse
         one = evidence.calibration.get(observable, Calibration())
         if column not in measured or not (one.offset or one.scale):
             continue
-        z = errors * [1.0, one.scale > 0.0]  # others of its instrument may be off in scale
+        z = errors * [1.0, one.scale > 0.0]  # another observable of its instrument may have an error of scale
         offset, scale = (float(each) for each in z * [one.offset, one.scale])
         length = float(np.hypot(*z))
         uses.append(CalibrationUse(observable, one.offset, one.scale, offset, scale, length))
@@ -90,7 +88,7 @@ def calibration_uses(fitted: Fitted, evidence: Evidence) -> tuple[CalibrationUse
 
 
 def size_intervals(fitted: Fitted) -> tuple[Interval, ...]:
-    """Natural size of each mechanism with its 90 % interval."""
+    """Return the natural size of each mechanism with its 90 % interval."""
     space = fitted.model.emulator.space
     out = []
     for number, (name, size) in enumerate(zip(fitted.mechanisms, fitted.coded_sizes, strict=True)):
@@ -100,46 +98,46 @@ def size_intervals(fitted: Fitted) -> tuple[Interval, ...]:
 
 
 def scatter_notes(fitted: Fitted) -> tuple[str, ...]:
-    """Say what replicates scatter more than the model at its optimum, and count so."""
+    """Note replicates that scatter more than the model at its optimum."""
     stack = fitted.stack
     excess = fitted.model.excess(fitted.x, stack.blocks[0].scatter)
     notes = []
-    if excess.runs > TOLD:
+    if excess.runs > REPORTED:
         notes.append(f"replicates scatter {excess.runs**0.5:.1f} times as much as the model's, and count so")
     notes += [
         f"readings of {name} scatter {reading**0.5:.1f} times as much as the model's runs do, each by itself,"
         " and count so"
         for name, reading in zip(fitted.model.emulator.observables, excess.reading, strict=True)
-        if reading > TOLD - 1.0
+        if reading > REPORTED - 1.0
     ]
     return tuple(notes)
 
 
 def _predictions(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
-    """Every observable of every condition, and its standard error from the fit and the emulator."""
+    """Return every observable of every condition, and its standard error from the fit and the emulator."""
     emulator = fitted.model.emulator
     count = len(emulator.observables)
     values, errors = [], []
     for condition in emulator.space.conditions:
-        told = forecast(fitted, (Block.of_runs(condition, np.arange(count), 1),))
-        values.append(told.predicted)
-        errors.append(np.sqrt(np.maximum(np.diag(told.covariance - told.noise), 0.0)))
+        seen = forecast(fitted, (Block.of_runs(condition, np.arange(count), 1),))
+        values.append(seen.predicted)
+        errors.append(np.sqrt(np.maximum(np.diag(seen.covariance - seen.noise), 0.0)))
     return np.array(values), np.array(errors)
 
 
 def _residual_map(fitted: Fitted, evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals in standard deviations, (conditions, observables), and two-sided p values after Holm."""
+    """Return residuals in standard deviations, (conditions, observables), and p values after Holm."""
     emulator = fitted.model.emulator
     shape = (len(emulator.space.conditions), len(emulator.observables))
     residuals, adjusted = np.full(shape, np.nan), np.full(shape, np.nan)
-    # The variance of a training residual is what a refit leaves of that of the measured less the predicted.
+    # the variance of a training residual is the part that a refit leaves
     root = np.linalg.inv(fitted.whitening) @ projector(fitted.sensitivities)
     training = np.sqrt(np.maximum((root**2).sum(axis=1), 1e-12 * np.diag(fitted.covariance)))
     raw = [(fitted.stack.target - fitted.stack.predict(fitted.x[None])[0]) / training]
     blocks = list(evidence.training)
     for block in evidence.held_out:
-        told = forecast(fitted, (block,))
-        raw.append((told.measured - told.predicted) / np.sqrt(np.diag(told.covariance)))
+        seen = forecast(fitted, (block,))
+        raw.append((seen.measured - seen.predicted) / np.sqrt(np.diag(seen.covariance)))
         blocks.append(block)
     whole = np.concatenate(raw)
     p_values = holm(2.0 * stats.norm.sf(np.abs(whole)))
@@ -152,7 +150,7 @@ def _residual_map(fitted: Fitted, evidence: Evidence) -> tuple[np.ndarray, np.nd
 
 
 def drift_records(base: Fitted) -> tuple[Drift, ...]:
-    """Each factor fitted to one condition at a time."""
+    """Return each factor fitted to one condition at a time."""
     fits = condition_fits(base)
     if len(fits) < 2:
         return ()
@@ -176,7 +174,7 @@ def drift_records(base: Fitted) -> tuple[Drift, ...]:
 def candidate_record(
     assessment: Assessment, base: Signatures, scores: np.ndarray, settings: Settings
 ) -> Candidate:
-    """One row of the evidence table; of a pair, score and share are those of the stronger."""
+    """Return one row of the evidence table; for a pair, score and share are those of the stronger."""
     fitted = assessment.fitted
     numbers = [base.names.index(name) for name in assessment.mechanisms]
     found = objections(assessment, settings)

@@ -1,1 +1,1 @@
-"""Analysis beyond the fit: what the coefficients, the shape of the surface and single runs say."""
+"""Analysis beyond the fit: the shape of the surface, its best settings, diagnostics, formulas."""

@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 
 from doe.arguments import checked_flag, checked_kind, checked_level, real_array
-from doe.design.points import natural_points
-from doe.design.polynomial_terms import term_name
+from doe.design.design import natural_points
+from doe.design.polynomial_terms import Term, term_name
 from doe.errors import DesignError
 from doe.response.quadratic import QuadraticForm
+from doe.response.region import Region, box_cells
 from doe.response.response_surface import Surface
 from doe.response.surface_points import StationaryPoint
 
 FAR = 2.0
-"""Coded distance beyond which a stationary point says nothing about the runs: they reach 1 to 2."""
+"""Coded distance beyond which a stationary point is out of range of the runs, which reach 1 to 2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,7 @@ class CanonicalAnalysis:
     axes: pd.DataFrame
     """Directions of the axes in coded units, a row for each factor and a column for each axis."""
     table: pd.DataFrame
-    """By axis: curvature (eigenvalue), se, low, high (its interval), flat (the interval holds 0)."""
+    """Table by axis: curvature (eigenvalue), se, low, high (its interval), flat (the interval holds 0)."""
     notes: tuple[str, ...]
     """Warnings: a ridge, a stationary point far away."""
 
@@ -51,12 +52,12 @@ def canonical(surface: Surface, alpha: float = 0.05) -> CanonicalAnalysis:
     Along axis i the surface is mean + curvature_i w_i^2 from the stationary point. The curvatures' standard
     errors are those of Bisgaard and Ankenman (Technometrics 38, 1996, p. 238): curvature_i = v_i' B v_i with
     the axis held, which is linear in the coefficients. An interval that holds 0 is a ridge: along that axis
-    the response hardly changes, and a stationary point far out on it is a play of the noise.
+    the response hardly changes, and a stationary point far out on it is an effect of the noise.
 
     Parameters
     ----------
     surface : Surface
-        Of second degree.
+        Surface of second degree.
     alpha : float
         The intervals of the curvatures hold with probability 1 - alpha, each.
 
@@ -87,7 +88,7 @@ def canonical(surface: Surface, alpha: float = 0.05) -> CanonicalAnalysis:
     distance = float(np.linalg.norm(stationary.coded))
     if distance > FAR:
         notes.append(
-            f"The stationary point lies {distance:.2g} coded units from the center, beyond the runs: "
+            f"The stationary point is {distance:.2g} coded units from the center, beyond the runs: "
             "follow the ridge path instead."
         )
     return CanonicalAnalysis(stationary, axes, pd.DataFrame(columns, index=labels), tuple(notes))
@@ -98,13 +99,13 @@ def ridge_path(
 ) -> pd.DataFrame:
     """Return the best point on each sphere about the design's center (Hoerl 1959; Draper 1963).
 
-    On the sphere of coded radius r the largest response lies where (B - mu I) x = -b / 2 with mu above every
+    On the sphere of coded radius r the largest response is where (B - mu I) x = -b / 2 with mu above every
     curvature, and there is one such mu for each r.
 
     Parameters
     ----------
     surface : Surface
-        Of second degree.
+        Surface of second degree.
     radii : sequence of float
         Coded, not negative.
     descend : bool
@@ -123,7 +124,7 @@ def ridge_path(
     checked_kind("surface", surface, Surface)
     radii = real_array("radii", radii)
     if radii.ndim != 1 or not np.isfinite(radii).all() or (radii < 0.0).any() or radii.size == 0:
-        raise DesignError(f"radii are finite and not negative, got {radii.tolist()}")
+        raise DesignError(f"radii must be finite and not negative, got {radii.tolist()}")
     form = surface.quadratic_form
     sign = -1.0 if checked_flag("descend", descend) else 1.0
     rising = QuadraticForm(sign * form.constant, sign * form.slopes, sign * form.matrix)
@@ -159,8 +160,8 @@ def _on_sphere(form: QuadraticForm, radius: float) -> tuple[NDArray[np.float64],
     def excess(gap: float) -> float:
         return float(np.linalg.norm(slopes / (values - values[-1] - gap))) - radius
 
-    # As mu falls onto the largest curvature the point runs out to infinity, unless the slope along that axis
-    # is zero: then the rest of the radius is spent on that axis, in either direction.
+    # as mu approaches the largest curvature the point goes to infinity, unless the slope along that axis
+    # is zero: then the rest of the radius is spent on that axis, in either direction
     low = 1e-14 * scale
     if excess(low) <= 0.0:
         inner = np.zeros(len(values))
@@ -171,3 +172,56 @@ def _on_sphere(form: QuadraticForm, radius: float) -> tuple[NDArray[np.float64],
     high = float(np.linalg.norm(slopes)) / radius + 1e-12 * scale
     gap = optimize.brentq(excess, low, high, xtol=1e-300, rtol=8.9e-16, maxiter=500)
     return vectors @ (slopes / (values - values[-1] - gap)), float(values[-1] + gap)
+
+
+def stationary_region(
+    surface: Surface, alpha: float = 0.05, extent: float = 1.0, resolution: int | None = None
+) -> Region:
+    """Return the settings that may be the true stationary point.
+
+    At the true point the k components of the gradient are zero. The fitted gradient d(x) has the covariance
+    V(x) of its coefficients, so that d' V^-1 d <= k F(1 - alpha; k, residual df) holds there with probability
+    1 - alpha, exactly for normal errors and a true quadratic (Box and Hunter, Biometrika 41, 1954, p. 190).
+    The region may be open: it then extends beyond the box, and the runs do not determine the point.
+
+    Parameters
+    ----------
+    surface : Surface
+        Surface of second degree. After ``reduce``, the model before it gives the region.
+    extent : float
+        Coded half width of the box.
+    resolution : int, optional
+        Cells along each factor.
+    """
+    checked_level(alpha)
+    checked_kind("surface", surface, Surface)
+    honest = surface.unselected
+    names = honest.design.names
+    points, count = box_cells(len(names), extent, resolution)
+    terms = honest.terms
+    covariance = honest.fit.cov_params().to_numpy()[1 : len(terms) + 1, 1 : len(terms) + 1]
+    weights = honest.coded_coefficients.to_numpy()[1:]
+    jacobian = np.stack([_derivatives(points, terms, names.index(name), names) for name in names], axis=1)
+    gradient = jacobian @ weights
+    spread = np.einsum("pit,tu,pju->pij", jacobian, covariance, jacobian, optimize=True)
+    # where a part of the gradient has no error (no term moves it), that part must be zero
+    solved = np.einsum("pij,pj->pi", np.linalg.pinv(spread, hermitian=True), gradient)
+    statistic = np.einsum("pi,pi->p", gradient, solved)
+    limit = len(names) * stats.f.isf(alpha, len(names), honest.residual_df)
+    table = honest.points.iloc[:0].reindex(range(len(points)))
+    table[names] = points
+    return Region(honest.design.factors, table, statistic <= limit, count, extent)
+
+
+def _derivatives(points: np.ndarray, terms: tuple[Term, ...], place: int, names: list[str]) -> np.ndarray:
+    """Return the derivative of every term by one factor at points, shape (points, terms)."""
+    columns = []
+    for term in terms:
+        exponents = np.array([term.count(name) for name in names])
+        power = exponents[place]
+        if power == 0:
+            columns.append(np.zeros(len(points)))
+            continue
+        exponents[place] -= 1
+        columns.append(power * np.prod(points**exponents, axis=1))
+    return np.column_stack(columns)

@@ -11,9 +11,8 @@ from scipy import optimize
 from scipy.stats import qmc
 
 from doe.arguments import checked_flag, checked_kind, checked_list, checked_map, checked_number, checked_seed
-from doe.design.design import Design
+from doe.design.design import Design, natural_points
 from doe.design.families.optimal import Constraint, allowed
-from doe.design.points import natural_points
 from doe.errors import DesignError
 from doe.response.response_surface import Surface
 
@@ -21,24 +20,24 @@ STARTS = 6
 """Best points of the search grid from which the optimum is refined."""
 
 MOST_MOVES = 400
-"""Moves along the axes that end a search: where two wishes meet in an edge it would creep along for ever."""
+"""Largest number of moves along the axes: at an edge between two wishes the search creeps without end."""
 
 DRAWS_LOG2 = 12
 
 
 @dataclass(frozen=True)
 class Wish:
-    """Desirability of one response, from 0 (useless) to 1 (as good as wanted).
+    """Desirability of one response, from 0 (useless) to 1 (ideal).
 
     Derringer and Suich (J. Qual. Technol. 12, 1980, p. 214): between the ends it is the share of the way to
-    the power of a weight. Below 1 a weight is content early, above 1 it presses to the end.
+    the power of a weight. Below 1 a weight rises early, above 1 late.
 
     Parameters
     ----------
     low, high : float
         Ends of the scale, ``low < high``.
     target : float, optional
-        Where it is 1, between the ends. Without it the wish is one-sided.
+        Response of desirability 1, between the ends. Default: the wish is one-sided.
     larger : bool
         Without target: larger is better (0 at ``low``, 1 at ``high``), else smaller.
     weight : float or (float, float)
@@ -59,19 +58,19 @@ class Wish:
             checked_number(f"{place} of a wish", getattr(self, place))
         if self.target is not None:
             checked_number("target of a wish", self.target)
-        if not (np.isfinite(self.low) and np.isfinite(self.high) and self.low < self.high):
-            raise DesignError(f"a wish has low < high, both finite, got {self.low} and {self.high}")
+        if not self.low < self.high:
+            raise DesignError(f"low of a wish must be below high, got {self.low} and {self.high}")
         if self.target is not None and not self.low < self.target < self.high:
-            raise DesignError(f"a target lies between {self.low} and {self.high}, got {self.target}")
+            raise DesignError(f"target must be between {self.low} and {self.high}, got {self.target}")
         checked_flag("larger", self.larger)
         checked_number("importance of a wish", self.importance, above=0.0)
         weights = self.weight if isinstance(self.weight, tuple) else (self.weight,)
         for weight in weights:
             checked_number("weight of a wish", weight, above=0.0)
         if not 1 <= len(weights) <= 2:
-            raise DesignError(f"a wish has one weight, or two with a target, got {self.weight}")
+            raise DesignError(f"weight must be one number, or two with a target, got {self.weight}")
         if self.target is None and len(weights) > 1:
-            raise DesignError(f"a wish without target has one weight, got {self.weight}")
+            raise DesignError(f"weight without target must be one number, got {self.weight}")
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the desirability of responses."""
@@ -89,16 +88,16 @@ class Wish:
 
 @dataclass(frozen=True, eq=False)
 class BestSetting:
-    """The best setting that was found, and what the surfaces say there."""
+    """The best setting that was found, and the surfaces there."""
 
     natural: pd.Series
     coded: pd.Series
     responses: pd.DataFrame
-    """By response: what ``Surface.predict`` gives (mean, se, limits) and its desirability."""
+    """Table by response: the columns of ``Surface.predict`` and its desirability."""
     desirability: float
-    """Of all wishes together; NaN where one response is maximized or minimized."""
+    """Overall desirability; NaN where one response is maximized or minimized."""
     at_edge: tuple[str, ...]
-    """Factors at an edge of the region: the best setting may lie outside."""
+    """Factors at an edge of the region: the best setting may be outside."""
 
     def __str__(self) -> str:
         where = ", ".join(f"{name} = {value:.5g}" for name, value in self.natural.items())
@@ -112,7 +111,7 @@ class BestSetting:
         if len(self.responses) > 1:
             lines.append(f"All together: desirability {self.desirability:.3f}.")
         if self.at_edge:
-            lines.append(f"At the edge in {', '.join(self.at_edge)}: the best setting may lie beyond.")
+            lines.append(f"At the edge in {', '.join(self.at_edge)}: the best setting may be beyond.")
         return "\n".join(lines)
 
 
@@ -128,15 +127,14 @@ def maximize(
 
     Parameters
     ----------
-    surface : Surface
     extent : float
         Coded half width of the box.
     radius : float, optional
-        Coded radius about the center that the setting lies in.
+        Coded radius of the sphere about the center.
     constraints : sequence of str or callable
         Rules for the natural values, such as ``"v0 < v1"``.
     seed : int
-        Of the points that the search starts from.
+        Seed of the points that the search starts from.
     """
     checked_kind("surface", surface, Surface)
     return _best({"response": surface}, {}, 1.0, extent, radius, constraints, seed)
@@ -169,35 +167,35 @@ def most_desirable(
     Parameters
     ----------
     surfaces : mapping of Surface by response
-        Over the same factors.
+        Surfaces over the same factors.
     wishes : mapping of Wish by response
-        For every surface.
+        One for every surface.
     extent, radius, constraints, seed
         As in ``maximize``.
 
     Raises
     ------
     DesignError
-        Other factors, a response without wish or surface, or no setting that is not useless for some wish.
+        Other factors, a response without wish or surface, or no setting that meets all wishes.
     """
     checked_surfaces(surfaces)
     for name, wish in checked_map("wishes", wishes).items():
         checked_kind(f"wish of {name!r}", wish, Wish)
     if set(surfaces) != set(wishes):
-        raise DesignError(f"a wish for every surface: {sorted(surfaces)} and {sorted(wishes)}")
+        raise DesignError(f"wishes must be for every surface, got {sorted(surfaces)} and {sorted(wishes)}")
     return _best(surfaces, wishes, 1.0, extent, radius, constraints, seed)
 
 
 def checked_surfaces(surfaces: Mapping[str, Surface]) -> Design:
-    """Return the design of surfaces by response; raise DesignError unless they have the same factors."""
+    """Return the design of surfaces by response; raise DesignError for different factors."""
     given = checked_map("surfaces", surfaces)
     if not given:
-        raise DesignError("surfaces holds one fitted surface or more by response, got none")
+        raise DesignError("surfaces must be one or more by response, got an empty mapping")
     for name, surface in given.items():
         checked_kind(f"surface of {name!r}", surface, Surface)
     first = next(iter(given.values())).design
     if any(surface.design.factors != first.factors for surface in given.values()):
-        raise DesignError("the surfaces have the same factors, with the same ranges")
+        raise DesignError("the surfaces must have the same factors, with the same ranges")
     return first
 
 

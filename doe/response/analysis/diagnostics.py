@@ -1,4 +1,4 @@
-"""Diagnostics in plain words: runs that draw the fit, a better scale of the response, unequal spread."""
+"""Diagnostics: influential runs, a better scale of the response, unequal spread."""
 
 from dataclasses import dataclass
 
@@ -13,14 +13,14 @@ from doe.errors import DesignError
 from doe.response.response_surface import Surface
 
 LAMBDAS = (-2.0, 2.0)
-"""Powers that are searched, as in R's ``boxcox``."""
+"""Range of powers in the search, as in R's ``boxcox``."""
 
 NAMED_POWERS = {-1.0: "1 / y", -0.5: "1 / sqrt(y)", 0.0: "log(y)", 0.5: "sqrt(y)", 1.0: "y as it is"}
 
 
 @dataclass(frozen=True)
 class BoxCox:
-    """Power of the response that makes its residuals most normal and even; made by ``box_cox``."""
+    """Power of the response with the most normal and even residuals; made by ``box_cox``."""
 
     power: float
     low: float
@@ -45,7 +45,7 @@ class BoxCox:
 
 
 def influence(surface: Surface) -> pd.DataFrame:
-    """Return by observation how much it draws the fit, with a remark where it is much.
+    """Return the influence of each observation on the fit, with a remark where it is large.
 
     Returns
     -------
@@ -75,10 +75,10 @@ def influence(surface: Surface) -> pd.DataFrame:
 
 
 def _remark(row: pd.Series, df: float, count: int, runs: int) -> str:
-    """Say what is unusual about an observation; nothing where nothing is."""
+    """Describe an unusual observation; return an empty text for others."""
     remarks = []
     if np.isnan(row["studentized"]) or row["leverage"] > 1.0 - 1e-9:
-        return "fitted exactly: only this run tells one of the terms"
+        return "fitted exactly: only this run determines one of the terms"
     if df > 1.0 and np.abs(row["deleted"]) > stats.t.isf(0.025 / runs, df - 1.0):
         remarks.append("outlier: further off than noise would be in one of 20 such experiments")
     if row["leverage"] > min(2.0 * count / runs, 0.99):
@@ -91,14 +91,8 @@ def _remark(row: pd.Series, df: float, count: int, runs: int) -> str:
 def box_cox(surface: Surface, confidence: float = 0.95) -> BoxCox:
     """Return the power of the response under which the same model fits best (Box and Cox 1964).
 
-    The profile likelihood of the power between -2 and 2; the interval is where it lies within half a chi
-    square of its largest value.
-
-    Parameters
-    ----------
-    surface : Surface
-        Its model is kept.
-    confidence : float
+    It is the maximum of the profile likelihood between -2 and 2; the interval is where the likelihood is
+    within half a chi square of it.
 
     Raises
     ------
@@ -109,11 +103,7 @@ def box_cox(surface: Surface, confidence: float = 0.95) -> BoxCox:
     confidence = checked_level(confidence, "confidence")
     response = surface.response.to_numpy()
     if not (response > 0.0).all():
-        raise DesignError(
-            f"Box-Cox takes positive responses; the smallest is {response.min():g}: add a constant"
-        )
-    if not 0.0 < confidence < 1.0:
-        raise DesignError(f"confidence lies between 0 and 1, got {confidence}")
+        raise DesignError(f"responses for Box-Cox must be positive, got {response.min():g}: add a constant")
     basis = np.linalg.qr(np.asarray(surface.fit.model.exog))[0]
     scaled = np.log(response / np.exp(np.log(response).mean()))
 
@@ -155,7 +145,7 @@ class RobustTable:
 
 
 def robust_coefficients(surface: Surface) -> RobustTable:
-    """Return the coefficients with robust standard errors, and whether the replicates ask for them.
+    """Return coefficients with robust standard errors, and the verdict of the replicates on their spread.
 
     HC3 (MacKinnon and White, J. Econometrics 29, 1985, p. 305) from statsmodels; the replicates' spreads are
     compared by Levene's test about the medians (Brown and Forsythe 1974), in settings of three or more.

@@ -29,7 +29,7 @@ class LinearFit:
     fit: RegressionResults
     """The statsmodels least squares fit."""
     formula: str
-    """The model as it is written."""
+    """Text of the model."""
     table: pd.DataFrame
     """The data of the fit, one row an observation."""
 
@@ -83,30 +83,30 @@ class LinearFit:
 
 
 def fit_formula(design: Design, response: ArrayLike, formula: str, *, coded: bool = True) -> LinearFit:
-    """Fit a model that a formula writes, with the syntax of R and patsy.
+    """Fit a model given by a formula, with the syntax of R and patsy.
 
     Parameters
     ----------
     design : Design
-        Its factors are the formula's variables, and ``block`` where it has blocks; a category enters by its
-        levels' names.
+        Its factors are the formula's variables, and ``block`` if it has blocks; a category has its levels'
+        names.
     response : array-like, shape (runs,) or (runs, replicates)
     formula : str
-        The right-hand side: ``"A * B * C"``, ``"A + I(A**2) + variety"``, ``"C(block) + np.log(A)"``. A
-        design with blocks has them as a term, written or not.
+        The right-hand side: ``"A * B * C"``, ``"A + I(A**2) + variety"``, ``"C(block) + np.log(A)"``. Blocks
+        of the design are always a term.
     coded : bool
         Factors that are numbers are coded; False takes natural values.
 
     Raises
     ------
     DesignError
-        A formula that is not understood, a name that is no variable, terms that the runs cannot tell apart.
+        An invalid formula, an unknown name, terms that the runs cannot distinguish.
     """
     checked_kind("design", design, Design)
     if not isinstance(formula, str):
-        raise DesignError(f"formula is text such as 'A * B', got {formula!r}")
+        raise DesignError(f"formula must be text such as 'A * B', got {formula!r}")
     if "~" in formula:
-        raise DesignError(f"formula is the right-hand side alone, such as 'A * B', got {formula!r}")
+        raise DesignError(f"formula must be the right-hand side alone, such as 'A * B', got {formula!r}")
     observed, values = observations(design, response)
     table = (design.points if checked_flag("coded", coded) else design.natural).loc[observed.index].copy()
     for factor in design.factors:
@@ -129,7 +129,6 @@ def fit_mixture(mixture: Mixture, response: ArrayLike, model: str = "quadratic")
 
     Parameters
     ----------
-    mixture : Mixture
     response : array-like, shape (blends,) or (blends, replicates)
     model : {"linear", "quadratic", "special cubic"}
         Components; with their products of two; and of three (Scheffe 1958).
@@ -139,11 +138,11 @@ def fit_mixture(mixture: Mixture, response: ArrayLike, model: str = "quadratic")
     values = real_array("response", response)
     if values.ndim not in (1, 2) or len(values) != len(mixture.shares) or not np.isfinite(values).all():
         raise DesignError(
-            f"a response has a finite value for each of {len(mixture.shares)} blends, got "
-            f"shape {values.shape}"
+            f"a response must have a finite value for each of {len(mixture.shares)} blends, got shape "
+            f"{values.shape}"
         )
     if isinstance(response, pd.Series | pd.DataFrame) and not response.index.equals(mixture.shares.index):
-        raise DesignError("a labelled response has the labels of the blends, in their order")
+        raise DesignError("a labelled response must have the labels of the blends, in their order")
     values = values.reshape(len(values), -1)
     table = mixture.shares.iloc[np.repeat(np.arange(len(values)), values.shape[1])].copy()
     table["response"] = values.ravel()
@@ -162,8 +161,7 @@ def _fitted(formula: str, table: pd.DataFrame) -> LinearFit:
     rank = np.linalg.matrix_rank(matrix)
     if rank < matrix.shape[1]:
         raise DesignError(
-            f"the runs cannot tell the terms of {formula!r} apart: {matrix.shape[1]} coefficients, "
-            f"rank {rank}"
+            f"the runs cannot distinguish the terms of {formula!r}: rank {rank}, {matrix.shape[1]} terms"
         )
     if len(matrix) <= rank:
         raise DesignError(f"{len(matrix)} observations leave no error for {rank} coefficients of {formula!r}")

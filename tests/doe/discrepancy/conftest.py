@@ -1,4 +1,4 @@
-"""Lets the tests of the search for missing mechanisms import `synthetic`, the world that lies beside them."""
+"""Make `synthetic_world`, next to this file, importable in the tests of doe.discrepancy."""
 
 import sys
 from pathlib import Path

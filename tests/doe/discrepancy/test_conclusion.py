@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import emulator, measure
+from synthetic_world import emulator, measure
 
 from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
 from doe.discrepancy.fitting.fitted_model import Model, Stack

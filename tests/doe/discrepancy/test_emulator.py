@@ -9,11 +9,19 @@ from typing import Never
 import numpy as np
 import pytest
 from scipy import stats
-from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, measure, space
+from synthetic_world import (
+    CONDITIONS,
+    OBSERVABLES,
+    SETTINGS,
+    SyntheticSimulator,
+    bank,
+    emulator,
+    measure,
+    space,
+)
 
 from doe.discrepancy import Bank, Outcomes, bank_points, fit_emulator, fitted, load_bank, make_bank
 from doe.discrepancy.emulation import kriged_parts
-from doe.discrepancy.emulation.condition_surfaces import added
 from doe.discrepancy.emulation.kriged_parts import KrigedParts
 from doe.discrepancy.emulation.run_noise import ALIKE, fit_noise
 from doe.discrepancy.emulation.surface_fits import (
@@ -262,19 +270,3 @@ def test_the_scatter_under_a_mechanism_has_a_correlation_of_its_own() -> None:
     np.testing.assert_allclose(surfaces.correlation(half, ("sticks",)), between, rtol=1e-12)
     two = surfaces.correlation(both, ("sticks", "else"))
     np.testing.assert_allclose(two, addition.correlation, rtol=1e-12)
-
-
-def test_what_the_noise_of_a_bank_adds_to_an_effect_is_as_stated() -> None:
-    rng, count, draws = np.random.default_rng(12), 60, 200
-    theta, size = rng.uniform(-1.0, 1.0, (count, 1)), rng.uniform(0.0, 1.0, count)
-    noise = fit_noise(theta, rng.standard_normal((count, 4)), np.full(4, 1e-9))
-    [base] = fit_bases([BaseRuns.of(theta, np.zeros((count, 4)), noise)])
-    at, half, shown, stated = np.array([[0.3]]), np.array([0.5]), [], []
-    [terms] = added(at, half)
-    for _ in range(draws):
-        values = 3.0 * size[:, None] * (1.0 + theta) + rng.standard_normal((count, 4))
-        [addition] = fit_additions([AddedRuns(base, theta, size, values)])
-        shown.append(addition.predict(at, half)[0])
-        stated.append(terms @ addition.chance @ terms * np.diag(addition.covariance))
-    # 800 squares: 5 %; twice as much for scales and variances, which each draw finds anew.
-    assert np.var(shown, axis=0).mean() == pytest.approx(np.mean(stated), rel=3 * 0.1)

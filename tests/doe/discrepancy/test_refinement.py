@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
-from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure, space
+from synthetic_world import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure, space
 
 from doe.discrepancy import bank_points, fit_emulator, make_bank
 from doe.discrepancy.emulation.condition_surfaces import all_terms
@@ -98,21 +98,6 @@ def test_corrections_take_back_what_another_shift_does_to_the_emulated() -> None
             ahead, behind = (one.predict(CENTRE[None], condition)[0] for one in sides)
             # The same differences, of which the corrections are linear.
             np.testing.assert_allclose((ahead - behind) / 0.04, slope, atol=1e-6 * np.abs(slopes).max())
-
-
-def test_an_error_of_the_shift_opens_little_of_what_fresh_runs_have_shown() -> None:
-    runs = runs_of_a_world_that_is_off(3)
-    evidence = gather(measure({"delta": 0.6}, 3), model().emulator)
-    corrected = corrected_beside(OFF, runs)
-    assert corrected.shift is not None
-    certain = replace(corrected, shift=Shift(OFF, np.zeros((4, 4))))
-    plain, open_, bare = (
-        weigh(Stack(one, evidence.training), CENTRE)
-        for one in (certain, corrected, replace(corrected, corrections={}))
-    )
-    # Without runs the error of 0.14 is all there is; sixteen points of two runs leave next to nothing.
-    np.testing.assert_allclose(bare.errors, np.hypot(0.02**0.5, plain.errors), rtol=0.01)
-    np.testing.assert_allclose(open_.errors, plain.errors, rtol=0.05)
 
 
 def test_what_noise_in_the_slopes_opens_does_not_reach_the_null() -> None:

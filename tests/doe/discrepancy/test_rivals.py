@@ -7,12 +7,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from synthetic import CONDITIONS, OBSERVABLES, SyntheticSimulator, measure, space
+from synthetic_world import CONDITIONS, OBSERVABLES, SyntheticSimulator, measure, space
 
 from doe.discrepancy import Emulator, Settings, bank_points, fit_emulator, make_bank
-from doe.discrepancy.contest.fresh_runs import Laboratory
+from doe.discrepancy.contest.fresh_runs import FreshRuns
 from doe.discrepancy.contest.power import CODED_SIZES, Effects, shown_apart
-from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
+from doe.discrepancy.contest.rounds import CandidateModel, CandidateModels, simulate_again
 from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import gather
@@ -56,22 +56,22 @@ def test_errors_of_a_small_bank_do_not_tell_twins_apart(seed: int) -> None:
     assert shown_apart(effects, "alpha", 1.0)["delta"] > 10.0 * SMALL.tie_margin
 
 
-def _contest(is_open: bool) -> Contenders:
+def _contest(is_open: bool) -> CandidateModels:
     known = small(0)
     evidence = gather(measure({"alpha": 0.9}, 0, replicates=8), known)
     models = [(name,) for name in NAMES]
     stacks = [Stack(Model(known, names, SMALL.systematic), evidence.training) for names in models]
-    contenders = {names: Contender(fit(stack)) for names, stack in zip(models, stacks, strict=True)}
-    laboratory, simulator = Laboratory(known, CONDITIONS, 1), SyntheticSimulator(space(NAMES))
+    candidates = {names: CandidateModel(fit(stack)) for names, stack in zip(models, stacks, strict=True)}
+    fresh, simulator = FreshRuns(known, CONDITIONS, 1), SyntheticSimulator(space(NAMES))
     contest = simulate_again(
-        contenders, laboratory, SMALL, 0.0, lambda one, _: is_open and one.mechanisms != ("delta",)
+        candidates, fresh, SMALL, 0.0, lambda one, _: is_open and one.mechanisms != ("delta",)
     )
     try:
         points = next(contest)
         while True:
             points = contest.send(simulator(points))
     except StopIteration as end:
-        found: Contenders = end.value
+        found: CandidateModels = end.value
         return found
 
 

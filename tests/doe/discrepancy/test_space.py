@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from synthetic import SATURATION, saturating_bank
+from synthetic_world import SATURATION, saturating_bank
 
 from doe.discrepancy import MechanismRange, fit_emulator
-from doe.errors import RuleError
 
 
 @pytest.mark.parametrize("saturation", [None, 0.5, 0.05])
@@ -25,20 +24,6 @@ def test_over_one_saturation_the_effect_of_a_step_falls_to_1_over_e() -> None:
     steps = [mechanism.coded(at + 1e-6) - mechanism.coded(at) for at in (0.0, SATURATION, 2.0 * SATURATION)]
     assert steps[0] / steps[1] == pytest.approx(math.e, rel=1e-4)
     assert steps[1] / steps[2] == pytest.approx(math.e, rel=1e-4)
-
-
-@pytest.mark.parametrize("saturation", [0.0, -1.0, 0.0199, math.inf, math.nan])
-def test_a_saturation_is_a_distance_that_can_be_told_from_none(saturation: float) -> None:
-    with pytest.raises(RuleError, match=r"m: saturates over a hundredth of its range \(0\.02\) at least"):
-        MechanismRange("m", 3.0, 1.0, saturation=saturation)
-
-
-@pytest.mark.parametrize("null", [0.0, 4.0])
-def test_the_least_saturation_has_a_size_for_every_coded_one(null: float) -> None:
-    mechanism = MechanismRange("m", null, 2.0, saturation=0.01 * abs(2.0 - null))
-    sizes = [abs(mechanism.natural(coded) - null) for coded in (0.0, 0.5, 0.99, 1.0)]
-    assert sizes == sorted(sizes)
-    assert sizes[-1] == pytest.approx(abs(2.0 - null))
 
 
 def test_a_bank_keeps_its_sizes_under_another_saturation() -> None:

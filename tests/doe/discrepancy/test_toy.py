@@ -86,10 +86,6 @@ def test_a_hidden_mechanism_of_a_plain_function_is_named_with_its_size() -> None
     assert [both.held_out for both in found.before_after] == [False, True]
 
 
-def test_a_function_that_lacks_nothing_is_left_alone() -> None:
-    assert analysed({}).verdict is Verdict.NONE
-
-
 def test_the_example_of_the_package_runs() -> None:
     failed, tried = doctest.testmod(discrepancy)
     assert tried > 5

@@ -1,4 +1,4 @@
-"""Lets the tests of the trials import `synthetic`, the world of the tests of `doe.discrepancy`."""
+"""Lets the tests of the trials import `synthetic_world`, the world of the tests of `doe.discrepancy`."""
 
 import sys
 from pathlib import Path

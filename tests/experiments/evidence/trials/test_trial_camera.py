@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import synthetic
+import synthetic_world as synthetic
 
 from doe.discrepancy import Settings
 from experiments.evidence.trials.declaration import declared_effects

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import synthetic
+import synthetic_world as synthetic
 
 from doe.design.factors import Factor
 from doe.discrepancy import (

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 from scipy.special import logsumexp
-from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, emulator, measure
+from synthetic_world import CONDITIONS, OBSERVABLES, SETTINGS, emulator, measure
 
 from doe.discrepancy.fitting.model_fit import weigh
 from doe.errors import RuleError

@@ -51,8 +51,8 @@ def test_an_emulator_meets_curves_that_it_has_not_seen():
 @pytest.mark.parametrize(
     ("points", "curves", "rule"),
     [
-        (np.zeros((4, 2)), np.zeros((4, 5)), "needs 6 runs or more"),
-        (np.zeros((8, 2)), np.zeros((7, 5)), "has a row a run"),
+        (np.zeros((4, 2)), np.zeros((4, 5)), "must be 6 or more"),
+        (np.zeros((8, 2)), np.zeros((7, 5)), "must have a row for each run"),
         (np.zeros((8, 2)), np.full((8, 5), np.nan), "must be finite"),
     ],
 )
@@ -98,5 +98,5 @@ def test_a_forecast_holds_what_was_not_measured():
 
 
 def test_no_curve_is_no_fit():
-    with pytest.raises(RuleError, match="needs a measured curve"):
+    with pytest.raises(RuleError, match="must have at least one measured curve"):
         fit_curves(emulators(), PLACES, [], READING, seed=1)

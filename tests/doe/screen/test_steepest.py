@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from doe import (
-    DesignError,
     Factor,
     central_composite,
     climb_table,
@@ -38,11 +37,6 @@ def test_no_direction_of_that_length_rises_more(plane):
     others = np.random.default_rng(51).normal(size=(200, 3))
     others *= np.linalg.norm(move) / np.linalg.norm(others, axis=1, keepdims=True)
     assert (others @ [3.0, -1.5, 0.0]).max() <= move @ [3.0, -1.5, 0.0] + 1e-12
-
-
-def test_descent_is_the_opposite(plane):
-    up, down = steepest_path(plane, 3), steepest_path(plane, 3, descend=True)
-    assert down.coded.to_numpy() == pytest.approx(-up.coded.to_numpy(), abs=1e-12)
 
 
 def test_natural_steps_take_their_sign_from_the_model(plane):
@@ -80,20 +74,3 @@ def test_climb_table_averages_replicates(plane):
     assert table["response"].to_list() == [20.0, 24.0, 30.0]
     assert table["error"].to_list() == [-5.0, -1.0, 5.0]
     assert table["error_percent"].to_list() == pytest.approx([20.0, 4.0, 20.0], rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"steps": 0}, "steps of a path must be a whole number of at least 1, got 0"),
-        ({"step": -1.0}, "step must be positive and finite, got -1"),
-        ({"step": {"A": 1.0}}, "'B' has None"),
-        ({"step": {"D": 1.0}}, "step names 'D'"),
-        ({"factors": ["D"]}, "no factor is named 'D'"),
-        ({"start": {"A": 20.0}, "limits": {"A": (0.0, 12.0)}}, "'A' is 20.0, limits 0.0 to 12.0"),
-        ({"factors": ["C"]}, "no slope in C"),
-    ],
-)
-def test_refuses(plane, options, message):
-    with pytest.raises(DesignError, match=message):
-        steepest_path(plane, **{"steps": 3, **options})

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from doe import (
-    DesignError,
     Factor,
     Goal,
     Sample,
@@ -18,7 +17,6 @@ from doe import (
     joint_fit,
     plackett_burman,
     screen,
-    steepest_path,
 )
 
 FACTORS = [Factor("A", -1.0, 1.0), Factor("B", -1.0, 1.0)]
@@ -66,36 +64,6 @@ def test_a_reduced_surface_covers_the_true_mean() -> None:
     assert close(inside / trials, 0.95, trials)
 
 
-def test_two_measurements_leave_a_region_that_covers_at_least() -> None:
-    rng = np.random.default_rng(93)
-    surface = fit_surface(DESIGN, rng.standard_normal(len(DESIGN.coded)))
-    half = surface.compatible_region(Sample(0.0, 1.0, 2), resolution=5)
-    # The whole box is compatible with two such measurements; the fit alone rules parts of it out.
-    assert half.fraction == 1.0
-    assert surface.compatible_region(2.0, resolution=5).fraction < 1.0
-
-
-@pytest.mark.parametrize("start", [{"A": -0.8, "B": 0.9}, {"A": 0.9, "B": -0.9}, {"A": 0.0, "B": 0.9}])
-@pytest.mark.parametrize("descend", [False, True])
-def test_a_path_from_anywhere_on_a_quadratic_goes_its_way(start: dict, descend: bool) -> None:
-    a, b = DESIGN.points.to_numpy().T
-    hill = 30.0 - 3.0 * (a - 0.2) ** 2 - 2.0 * (b + 0.1) ** 2
-    surface = fit_surface(DESIGN, -hill if descend else hill)
-    path = steepest_path(surface, 6, step=0.1, start=start, descend=descend)
-    assert len(path.predicted) >= 3
-    assert (np.diff(path.predicted) * (-1.0 if descend else 1.0) > 0.0).all()
-    first = np.diff(path.coded.to_numpy()[:2], axis=0)[0]
-    slope = surface.quadratic_form.gradient(path.coded.to_numpy()[0]) * (-1.0 if descend else 1.0)
-    np.testing.assert_allclose(first, 0.1 * slope / np.abs(slope).max(), atol=1e-9)
-
-
-def test_a_step_over_the_top_is_refused() -> None:
-    a, b = DESIGN.points.to_numpy().T
-    surface = fit_surface(DESIGN, 30.0 - (a - 0.2) ** 2 - (b + 0.1) ** 2)
-    with pytest.raises(DesignError, match="first step leads over the top"):
-        steepest_path(surface, 3, step=2.0)
-
-
 def test_one_strong_interaction_does_not_alarm_by_default() -> None:
     rng = np.random.default_rng(94)
     design = plackett_burman([Factor(f"x{i}", -1.0, 1.0) for i in range(5)], 12)
@@ -122,13 +90,6 @@ def test_lenths_false_alarms_come_at_the_level(factors: int, runs: int) -> None:
     assert close(alarms, 0.05, trials)
     assert (result.table["p"] < 0.05).tolist() == (result.table["t"].abs() > critical).tolist()
     assert result.anova.loc["x0", "p"] == result.table.loc["x0", "p"]
-
-
-def test_missing_runs_have_their_own_lenth_limits() -> None:
-    design = plackett_burman([Factor(f"x{i}", -1.0, 1.0) for i in range(9)], 12).select(range(1, 12))
-    result = screen(design, np.random.default_rng(96).standard_normal(11), error="lenth")
-    assert 1.5 < result.critical_t(0.05) < 4.0
-    assert result.critical_t(0.01) > result.critical_t(0.05) > result.critical_t(0.5)
 
 
 def test_welch_is_the_default_and_the_guarded_test_agrees_with_itself() -> None:
@@ -163,10 +124,3 @@ def test_the_misfit_without_noise_is_as_often_too_low_as_too_high(noise: float) 
     assert inside / trials > 0.94
     # The unbiased square's root reads .93 and .85.
     assert mean > (0.97 if noise == 0.5 else 0.91)
-
-
-def test_few_runs_leave_intervals_that_say_so() -> None:
-    found = agreement([1.0, 2.0, 4.0], [1.5, 1.0, 4.0], strata=["a", "b", "c"])
-    assert (found.bias.low, found.bias.high) == (-np.inf, np.inf)
-    assert found.spearman.high - found.spearman.low > 1.5
-    assert found.rmse.high > 2.0 * found.rmse.value

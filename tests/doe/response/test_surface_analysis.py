@@ -23,8 +23,6 @@ from doe import (
     minimize,
     most_desirable,
     ridge_path,
-    robust_coefficients,
-    screen,
     simplex_lattice,
     stationary_region,
     two_level_effects,
@@ -57,16 +55,6 @@ def test_blocks_are_a_term_and_dummies_are_named():
         Design.from_table(table, design.factors, coded=True)
     again = Design.from_table(table, design.factors, coded=True, block="block")
     assert fit_surface(again, shifted).residual_ms == pytest.approx(blocked.residual_ms, rel=1e-12)
-
-
-def test_blocks_in_a_screening_are_no_error():
-    design = full_factorial([Factor(name, 0.0, 1.0) for name in "abcd"], blocks=2)
-    response = 2.0 * design.points["a"].to_numpy() + 50.0 * (design.blocks == 2).to_numpy()
-    response = response + np.random.default_rng(2).normal(scale=0.3, size=16)
-    result = screen(design, response, error="pooled")
-    assert result.error_ms < 0.5
-    assert result.significant(0.01) == ["a"]
-    assert "blocks" in result.anova.index
 
 
 def test_canonical_analysis_finds_the_drawn_shape():
@@ -114,16 +102,6 @@ def test_ridge_path_beats_every_other_point_of_its_sphere():
         assert down["mean"][radius] <= values.min() + 1e-9
     with pytest.raises(DesignError, match="finite and not negative"):
         ridge_path(surface, [-1.0])
-
-
-def test_symmetric_ridge_leaves_the_center_along_its_axis():
-    design = central_composite(FACTORS, center=3)
-    a, b = design.points.to_numpy().T
-    noise = np.random.default_rng(5).normal(scale=1e-12, size=len(a))
-    surface = fit_surface(design, 2.0 * a**2 - b**2 + noise)
-    row = ridge_path(surface, [1.0]).iloc[0]
-    assert abs(row["coded a"]) == pytest.approx(1.0, abs=1e-6)
-    assert row["mean"] == pytest.approx(2.0, abs=1e-6)
 
 
 def test_region_of_the_optimum_covers_it():
@@ -190,7 +168,7 @@ def test_most_desirable_setting_is_that_of_a_fine_grid():
     assert best.desirability == pytest.approx(overall.max(), abs=1e-3)
     with pytest.raises(DesignError, match="no setting of the region meets every wish"):
         most_desirable(surfaces, {**wishes, "yield": Wish(50.0, 60.0)})
-    with pytest.raises(DesignError, match="a wish for every surface"):
+    with pytest.raises(DesignError, match="wishes must be for every surface"):
         most_desirable(surfaces, {"yield": Wish(0.0, 1.0)})
 
 
@@ -211,19 +189,8 @@ def test_box_cox_finds_the_scale_that_was_drawn():
         found = box_cox(fit_surface(design, scaled))
         assert found.low < power < found.high
         assert found.advice == advice
-    with pytest.raises(DesignError, match="positive responses"):
+    with pytest.raises(DesignError, match="must be positive"):
         box_cox(fit_surface(design, response - 20.0))
-
-
-def test_robust_errors_are_asked_for_where_replicates_disagree():
-    design = full_factorial(FACTORS)
-    rng = np.random.default_rng(9)
-    spread = np.array([0.1, 0.1, 0.1, 3.0])[:, None]
-    uneven = robust_coefficients(fit_surface(design, spread * rng.normal(size=(4, 12)), "first-order"))
-    assert uneven.spread_p < 0.05
-    assert "use the robust errors" in uneven.note
-    even = robust_coefficients(fit_surface(design, rng.normal(size=(4, 12)), "first-order"))
-    assert "the usual errors serve" in even.note
 
 
 def test_terms_may_be_written():
@@ -241,7 +208,7 @@ def test_terms_may_be_written():
     assert at["intercept"] + at["a"] * 0.25 + at["b"] * 0.9 + at["c"] * 0.4 + at["a:b"] * 0.225 + at[
         "a:c"
     ] * 0.1 + at["b:c"] * 0.36 + at["a:b:c"] * 0.09 + at["c^2"] * 0.16 == pytest.approx(natural, abs=1e-7)
-    with pytest.raises(DesignError, match="second degree; the model has a:b:c"):
+    with pytest.raises(DesignError, match="second degree, got a:b:c"):
         surface.stationary_point()
     refused = {"needs": ["a:b"], "no factor is named 'q'": ["q"], "twice": ["a", "a"], "one power": ["a:b^2"]}
     for message, bad in refused.items():
@@ -269,12 +236,6 @@ def test_formulas_take_categories_and_blocks():
             fit_formula(design, response, bad)
 
 
-def test_two_level_category_in_a_surface():
-    design = full_factorial([Factor("t", 20.0, 30.0), Category("kind", ["a", "b"])])
-    surface = fit_surface(design, np.array([[1.0, 1.1], [2.0, 2.1], [4.0, 4.1], [5.0, 5.1]]), "first-order")
-    assert surface.predict({"t": 25.0, "kind": "b"})["mean"].iloc[0] == pytest.approx(4.55)
-
-
 def test_scheffe_polynomial_returns_pure_blends():
     mixture = simplex_lattice(["x", "y", "z"], 2)
     truth = (
@@ -285,7 +246,7 @@ def test_scheffe_polynomial_returns_pure_blends():
     replicates = np.column_stack([truth + 1e-9, truth - 1e-9])
     fit = fit_mixture(mixture, replicates)
     assert fit.coefficient_table["estimate"].to_numpy() == pytest.approx([3, 5, 0, 8, 0, 0], abs=1e-7)
-    with pytest.raises(DesignError, match="model is one of"):
+    with pytest.raises(DesignError, match="model must be one of"):
         fit_mixture(mixture, replicates, "cubic")
 
 
@@ -299,7 +260,7 @@ def test_lenth_names_the_active_effects_of_a_saturated_fraction():
     assert "b:d" in {name, *result.table.loc[name, "mixed with"].split(", ")}
     assert result.significant(0.05) == ["a", name]
     assert result.limit(together=True) > result.limit()
-    with pytest.raises(DesignError, match="five or more effects"):
+    with pytest.raises(DesignError, match="must be five or more"):
         two_level_effects(full_factorial(FACTORS), [1.0, 2.0, 3.0, 5.0])
 
 
@@ -318,7 +279,7 @@ def test_a_wrong_block_is_refused():
     design, _ = drawn()
     with pytest.raises(DesignError, match="one label for each of 13 runs"):
         design.with_blocks(["a"])
-    with pytest.raises(DesignError, match="run 1 has none"):
+    with pytest.raises(DesignError, match="run 1 has no block"):
         design.with_blocks([None] + ["a"] * 12)
     with pytest.raises(DesignError, match="by the runs' labels"):
         Design(design.factors, design.coded, blocks=pd.Series(["a"] * 13))

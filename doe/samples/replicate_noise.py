@@ -46,14 +46,14 @@ class NoiseFloor:
 
 @dataclass(frozen=True)
 class VarianceRatio:
-    """F test of one mean square against another, one-sided: is the first one larger."""
+    """F test of one mean square against another, one-sided: the first one is larger."""
 
     F: float
     df: tuple[float, float]
 
     @property
     def p(self) -> float:
-        """Probability of so large a ratio when both estimate the same variance."""
+        """Probability of such a ratio when both estimate the same variance."""
         return float(stats.f.sf(self.F, *self.df))
 
 
@@ -72,7 +72,7 @@ def variance_ratio(mean_sq: float, df: float, error_ms: float, error_df: float) 
 def curvature_test(
     corners: Sample | Sequence[float] | NDArray, centers: Sample | Sequence[float] | NDArray
 ) -> VarianceRatio:
-    """Test whether the center lies off the plane through a two-level design's runs.
+    """Test if the center is off the plane through a two-level design's runs.
 
     Single-degree-of-freedom curvature nF nC (mean F - mean C)^2 / (nF + nC) against the spread of the
     replicated centers (Montgomery, Design and Analysis of Experiments, section 6.8).
@@ -81,7 +81,7 @@ def curvature_test(
     gap = corner.mean - center.mean
     curvature = corner.n * center.n * gap**2 / (corner.n + center.n)
     if not center.sd > 0.0:
-        raise DesignError("the curvature test needs centers that spread: all of them are the same")
+        raise DesignError("centers must differ, got the same value each time")
     return VarianceRatio(curvature / center.sd**2, (1.0, float(center.df)))
 
 
@@ -98,7 +98,7 @@ def effect_power(effect: float, sd: float, observations: int, error_df: float, a
         All observations of the balanced design (runs x replicates): the effect's standard error is
         2 sd / sqrt(observations).
     error_df : float
-        Degrees of freedom of the error that the test uses.
+        Degrees of freedom of the test's error.
     """
     checked_count("observations", observations)
     for name, value in (("sd", sd), ("error_df", error_df)):
@@ -106,7 +106,7 @@ def effect_power(effect: float, sd: float, observations: int, error_df: float, a
     checked_level(alpha)
     shift = abs(checked_number("effect", effect)) * math.sqrt(observations) / (2.0 * sd)
     critical = float(stats.t.isf(0.5 * alpha, error_df))
-    # the lower tail as an upper one: scipy's cdf is not a number far below the centre
+    # the lower tail as an upper one: scipy's cdf is NaN far below the centre
     return float(stats.nct.sf(critical, error_df, shift) + stats.nct.sf(critical, error_df, -shift))
 
 
@@ -115,7 +115,7 @@ def detectable_effect(
 ) -> float:
     """Return the smallest effect that is found with a given power (see ``effect_power``)."""
     if not checked_level(alpha) < checked_number("power", power) < 1.0:
-        raise DesignError(f"power lies between alpha ({alpha}) and 1, got {power}")
+        raise DesignError(f"power must be between alpha ({alpha}) and 1, got {power}")
     checked_count("observations", observations)
     for name, value in (("sd", sd), ("error_df", error_df)):
         checked_number(name, value, above=0.0)

@@ -9,18 +9,12 @@ from doe import (
     Design,
     Factor,
     Surface,
-    alias_structure,
     box_behnken,
     central_composite,
-    definitive_screening,
     fit_surface,
-    fractional_factorial,
-    full_factorial,
-    plackett_burman,
-    screen,
 )
 
-QUICK = settings(max_examples=25, deadline=None, derandomize=True)
+QUICK = settings(max_examples=8, deadline=None, derandomize=True)
 SEEDS = st.integers(0, 2**16)
 
 
@@ -54,39 +48,6 @@ def composites(draw) -> Design:
 
 
 @QUICK
-@given(st.integers(1, 30), st.integers(0, 3))
-def test_screening_columns_are_orthogonal(count, spare):
-    runs = 4 * -(-(count + spare + 1) // 4)
-    design = plackett_burman(factors(count), max(runs, 8))
-    matrix = design.coded.to_numpy()
-    assert np.array_equal(matrix.T @ matrix, len(matrix) * np.eye(matrix.shape[1]))
-    assert np.array_equal(matrix.sum(axis=0), np.zeros(matrix.shape[1]))
-
-
-@QUICK
-@given(st.integers(3, 11), st.sampled_from([3, 4, 5]))
-def test_a_fraction_keeps_its_resolution(count, resolution):
-    design = fractional_factorial(factors(count), resolution=resolution)
-    structure = alias_structure(design)
-    assert structure.resolution >= resolution
-    matrix = structure.matrix.to_numpy()
-    main = matrix[:count, :count]
-    assert np.array_equal(main, np.eye(count))
-    if resolution >= 4:
-        assert np.abs(matrix[:count, count:]).max(initial=0.0) == 0.0
-    if resolution >= 5:
-        assert np.array_equal(matrix, np.eye(len(matrix)))
-
-
-@QUICK
-@given(st.integers(3, 14), st.integers(0, 3))
-def test_definitive_main_effects_are_clear_of_second_order(count, spare):
-    points = definitive_screening(factors(count), spare=spare).points.to_numpy()
-    second = (points[:, :, None] * points[:, None, :]).reshape(len(points), -1)
-    assert np.abs(points.T @ second).max() == 0.0
-
-
-@QUICK
 @given(composites(), SEEDS)
 def test_sums_of_squares_do_not_depend_on_the_order_of_rows(design, seed):
     response = response_of(design, seed)
@@ -97,18 +58,6 @@ def test_sums_of_squares_do_not_depend_on_the_order_of_rows(design, seed):
     assert sums(fit_surface(shuffled, response[order])) == pytest.approx(
         sums(fit_surface(design, response)), rel=1e-8, abs=1e-9
     )
-
-
-@QUICK
-@given(composites(), SEEDS)
-def test_sums_of_squares_do_not_depend_on_labels(design, seed):
-    response = response_of(design, seed)
-    names = [f"run {number}" for number in range(len(response))]
-    renamed = [Factor(f"z{number}", f.low, f.high) for number, f in enumerate(design.factors)]
-    table = design.coded.set_axis([f.name for f in renamed], axis=1).set_axis(names, axis=0)
-    blocks = None if design.blocks is None else design.blocks.map(lambda b: f"day {b}").set_axis(names)
-    again = Design(tuple(renamed), table, blocks=blocks)
-    assert np.array_equal(sums(fit_surface(again, response)), sums(fit_surface(design, response)))
 
 
 @QUICK
@@ -146,15 +95,6 @@ def test_the_model_does_not_depend_on_the_coding(design, seed, stretch, shift):
 
 
 @QUICK
-@given(composites(), SEEDS, st.floats(-100.0, 100.0), st.floats(0.1, 100.0))
-def test_sums_of_squares_follow_the_response_unit(design, seed, zero, unit):
-    response = response_of(design, seed)
-    again = fit_surface(design, zero + unit * response)
-    loss = 1e-8 * max(1.0, abs(zero) / unit)
-    assert sums(again) / unit**2 == pytest.approx(sums(fit_surface(design, response)), rel=loss, abs=loss)
-
-
-@QUICK
 @given(composites(), SEEDS)
 def test_sums_of_squares_add_up(design, seed):
     surface = fit_surface(design, response_of(design, seed))
@@ -178,19 +118,4 @@ def test_a_shift_between_orthogonal_blocks_changes_nothing_else(count, seed, shi
     terms = ours.coded_coefficients.index[1:]
     assert ours.anova.loc[[*terms, "residual"], "sum_sq"].to_numpy() == pytest.approx(
         theirs.anova.loc[[*terms, "residual"], "sum_sq"].to_numpy(), rel=1e-8, abs=1e-9
-    )
-
-
-@QUICK
-@given(st.integers(2, 5), SEEDS)
-def test_effects_do_not_depend_on_which_level_is_low(count, seed):
-    design = full_factorial(factors(count), center=2)
-    response = response_of(design, seed)
-    turned = design.coded.copy()
-    turned["x0"] = -turned["x0"]
-    first = screen(design, response, error="pooled")
-    second = screen(Design(design.factors, turned), response, error="pooled")
-    assert second.table["effect"]["x0"] == pytest.approx(-first.table["effect"]["x0"], rel=1e-9, abs=1e-12)
-    assert second.anova["sum_sq"].to_numpy() == pytest.approx(
-        first.anova["sum_sq"].to_numpy(), rel=1e-9, abs=1e-10
     )

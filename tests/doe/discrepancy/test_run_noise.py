@@ -157,10 +157,3 @@ def test_a_misfit_too_small_for_one_observable_is_said_by_all(misfit: float) -> 
     assert np.mean(found) == pytest.approx(misfit, abs=0.045)
     # Seen one by one each would be open by .5: they scatter by little more than their mean does.
     assert np.std(found) < 0.15
-
-
-def test_a_misfit_of_one_observable_stays_its_own() -> None:
-    ratio = np.ones((5, 12))
-    ratio[:, 3] = 30.0
-    found = shared_misfits(ratio, np.full((5, 1), 12.0), np.full((5, 1), 24.0))
-    assert found[:, 3].min() > 10.0 > found[:, :3].max()

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 from doe import (
-    DesignError,
     Factor,
     Sample,
     Surface,
@@ -130,26 +129,3 @@ def test_runs_lie_there_across_and_along_inside_the_box() -> None:
     assert (moves[1] @ slope > 0.0, moves[2] @ slope < 0.0) == (True, True)
     assert moves[[3, 4]] @ slope == pytest.approx(0.0, abs=1e-9)
     assert np.linalg.norm(moves[1:5], axis=1) == pytest.approx(0.5)
-
-
-def test_one_factor_has_no_direction_along_its_contour() -> None:
-    design = central_composite((E,), "face", 4)
-    noise = np.random.default_rng(7).normal(0.0, 0.1, len(design.coded))
-    surface = fit_surface(design, 28.0 + 2.0 * design.coded["E"] + noise)
-    runs = transfer_points(surface, {"E": 0.4}, 4, step=0.5)
-    assert list(runs["E"]) == pytest.approx([0.4, 0.45, 0.35, 0.4])
-
-
-@pytest.mark.parametrize(
-    ("runs", "response", "rule"),
-    [
-        (pd.DataFrame({"E": [0.4] * 3, "F": [0.05] * 3}), [1.0, 2.0, 3.0], "4 runs or more"),
-        (pd.DataFrame({"E": [0.4] * 4, "F": [0.05] * 4}), [1.0, 2.0, 3.0, 4.0], "where the surface differs"),
-        (pd.DataFrame({"E": [0.3, 0.4, 0.5, 0.4]}), [1.0, 2.0, 3.0, 4.0], "no column for factor 'F'"),
-        (pd.DataFrame({"E": [0.3, 0.4, 0.5, 0.4], "F": [0.05] * 4}), [1.0, 2.0, np.nan, 4.0], "finite"),
-        (pd.DataFrame({"E": [0.3, 0.4, 0.5, 0.4], "F": [0.05] * 4}), [1.0] * 4, "all the same"),
-    ],
-)
-def test_runs_that_tell_nothing_are_refused(runs: pd.DataFrame, response: list[float], rule: str) -> None:
-    with pytest.raises(DesignError, match=rule):
-        transfer(source(0.1, np.random.default_rng(6)), runs, response, LEVEL)

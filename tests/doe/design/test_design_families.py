@@ -33,8 +33,6 @@ from doe import (
     simplex_lattice,
     sobol,
 )
-from doe.design.families.factorial import CATALOGUE
-from doe.design.families.hadamard import conference_matrix
 from doe.design.families.mixture import Mixture
 
 # Word lengths of the catalogue's first designs (Chen, Sun and Wu 1993): resolution by runs and factors.
@@ -60,11 +58,6 @@ def test_fractions_have_the_published_resolution(runs, count, resolution):
     assert alias_structure(design, order=1).resolution == resolution
 
 
-def test_catalogue_lists_as_many_generators_as_are_needed():
-    for runs, table in CATALOGUE.items():
-        assert all(2 ** (count - len(words)) == runs for count, words in table.items())
-
-
 def test_fraction_of_a_resolution_is_the_smallest():
     sizes = [len(fractional_factorial(factors(7), resolution=r).coded) for r in (3, 4, 5, 7)]
     assert sizes == [8, 16, 64, 64]
@@ -77,9 +70,9 @@ def test_generators_and_their_aliases_in_words():
     text = str(alias_structure(design))
     assert "Resolution III" in text
     assert "-x1:x2:x4, x1:x3:x5" in text
-    assert "Not told apart: x1 = -x2:x4 = x3:x5" in text
+    assert "Inseparable: x1 = -x2:x4 = x3:x5" in text
     for bad in (["x4 = x1:x9"], ["x9 = x1:x2"], ["x1:x2"], ["x5 = x4:x1", "x4 = x1:x2"]):
-        with pytest.raises(DesignError, match="a generator gives one of"):
+        with pytest.raises(DesignError, match="a generator must give one of"):
             fractional_factorial(factors(5), generators=bad)
 
 
@@ -125,22 +118,6 @@ def test_blocks_of_a_composite_design_do_not_disturb_the_model(count, blocks):
     assert ours == pytest.approx(theirs, abs=1e-10)  # rounding of the two solutions
 
 
-def test_orthogonal_axial_distance_makes_squares_uncorrelated():
-    design = central_composite(factors(3), "orthogonal", center=4)
-    squares = design.points.to_numpy() ** 2
-    covariance = np.cov(squares.T)
-    assert covariance[0, 1] == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize("count", [4, 5, 6, 7])
-def test_blocks_of_box_behnken_are_orthogonal(count):
-    design = box_behnken(factors(count), blocks=True)
-    points = design.points
-    terms = [points[a] * points[b] for a, b in itertools.combinations_with_replacement(points, 2)]
-    for column in [*(points[name] for name in points), *terms]:
-        assert np.ptp(column.groupby(design.blocks.to_numpy()).mean()) == pytest.approx(0.0, abs=1e-15)
-
-
 @pytest.mark.parametrize("count", [3, 4, 5, 6, 7, 8, 10, 16, 22])
 def test_definitive_screening_keeps_main_effects_clear(count):
     design = definitive_screening(factors(count))
@@ -151,13 +128,6 @@ def test_definitive_screening_keeps_main_effects_clear(count):
     assert np.array_equal(points.T @ points, (points[:, 0] ** 2).sum() * np.eye(count))
     assert np.abs(points.T @ second).max() == 0.0
     assert len(points) == 2 * {3: 4, 5: 6, 7: 8, 22: 24}.get(count, count) + 1
-
-
-@pytest.mark.parametrize("order", [4, 6, 8, 10, 12, 14, 16, 24, 26])
-def test_conference_matrices(order):
-    matrix = conference_matrix(order)
-    assert np.array_equal(matrix.T @ matrix, (order - 1) * np.eye(order))
-    assert np.array_equal(np.abs(matrix), 1.0 - np.eye(order))
 
 
 def test_foldover_clears_main_effects():
@@ -226,12 +196,6 @@ def test_optimal_designs_are_the_known_ones():
         assert d / 1.14e-2 ** (1.0 / 6.0) == pytest.approx(efficiency, abs=2e-3), runs
 
 
-def test_i_optimal_predicts_better_and_d_optimal_determines_better():
-    d, i = (design_quality(optimal_design(factors(3), 14, criterion=c, starts=8)) for c in "DI")
-    assert i.prediction_variance < d.prediction_variance
-    assert d.d_efficiency > i.d_efficiency
-
-
 def test_constraints_are_kept():
     speeds = [Factor(name, 0.0, 10.0) for name in ("v0", "v1", "v2")]
     rules = ["v0 < v1 < v2", lambda table: table["v2"] < 9.9]
@@ -242,7 +206,7 @@ def test_constraints_are_kept():
         optimal_design(speeds, 12, constraints=["v0 > 11"])
     with pytest.raises(DesignError, match="cannot be evaluated"):
         optimal_design(speeds, 12, constraints=["v9 > 11"])
-    with pytest.raises(DesignError, match="cannot tell 10 coefficients"):
+    with pytest.raises(DesignError, match="cannot distinguish 10 coefficients"):
         optimal_design(speeds, 12, constraints=["v0 == v1"])
 
 
@@ -268,7 +232,7 @@ def test_categories_enter_where_the_design_allows():
             refused([*factors(3), variety])
     with pytest.raises(DesignError, match="category 'variety' has 3"):
         plackett_burman([variety])
-    with pytest.raises(DesignError, match="has the levels"):
+    with pytest.raises(DesignError, match="must be one of"):
         variety.to_coded("tame")
 
 
@@ -280,18 +244,6 @@ def test_power_is_that_of_a_balanced_effect():
     assert table["power at 2"].to_numpy() == pytest.approx(effect_power(2.0, 0.8, 16, 12), rel=1e-12)
     with pytest.raises(DesignError, match="leave no degrees of freedom"):
         power_table(design, model="three-factor")
-
-
-def test_power_holds_in_simulation():
-    design = add_center(full_factorial(factors(3)), 3)
-    expected = power_table(design, [1.5], sd=1.0, model="interaction").loc["x1", "power at 1.5"]
-    rng = np.random.default_rng(8)
-    found = 0
-    for _ in range(150):
-        response = 0.75 * design.points["x1"].to_numpy() + rng.normal(size=len(design.coded))
-        found += fit_surface(design, response, "interaction").anova.loc["x1", "p"] < 0.05
-    # Three standard errors of a share of 150.
-    assert found / 150 == pytest.approx(expected, abs=3.0 * (expected * (1.0 - expected) / 150) ** 0.5)
 
 
 def test_mixtures():

@@ -66,11 +66,6 @@ def test_nearest_point_of_a_plane_is_its_foot(count):
     assert coded(surface.nearest(3.4)) == pytest.approx(foot, abs=1e-7)
 
 
-def test_nearest_to_another_point():
-    surface = surface_of(lambda x, y: x**2 + y**2, 2)
-    assert coded(surface.nearest(0.25, to={"x1": 10.0, "x2": 13.0})) == pytest.approx([0.0, 0.5], abs=1e-7)
-
-
 def test_nearest_point_stays_in_the_box():
     surface = surface_of(lambda x, y: x + 0.1 * y, 2)
     assert coded(surface.nearest(1.05)) == pytest.approx([1.0, 0.5], abs=1e-7)
@@ -93,11 +88,6 @@ def test_stationary_point(function, kind):
     assert point.inside
 
 
-def test_straight_surface_has_no_stationary_point():
-    with pytest.raises(DesignError, match="straight along"):
-        surface_of(lambda x, y: 1.0 + x + y + x**2, 2).stationary_point()
-
-
 def test_band_area_of_an_annulus():
     band = surface_of(lambda x, y: x**2 + y**2, 2).band(0.5, 0.25)
     # pi (0.75 - 0.25) / 4 of the square; 400 x 400 cells miss the border by less than 1e-3.
@@ -114,24 +104,6 @@ def test_projection_is_the_shadow_on_two_factors():
     assert shadow.mean() == pytest.approx(np.pi * 0.25 / 4.0, abs=np.pi / 4.0 / 54)
     with pytest.raises(DesignError, match="two of x1, x2, x3, got 'x1' and 'x1'"):
         band.projection("x1", "x1")
-
-
-def test_compatible_region_grows_with_the_error_of_the_target():
-    surface = surface_of(lambda x, y: 30.0 + x + y, 2, noise=0.2)
-    exact, vague = (surface.compatible_region(30.0, se).fraction for se in (0.0, 0.5))
-    assert 0.0 < exact < vague < 1.0
-    sample = Sample(30.0, 0.5 * np.sqrt(4.0), 4)
-    by_sample = surface.compatible_region(sample)
-    by_number = surface.compatible_region(30.0, 0.5, target_df=3)
-    assert np.array_equal(by_sample.mask, by_number.mask)
-
-
-def test_compatible_region_of_no_match_is_empty():
-    region = surface_of(lambda x, y: 30.0 + x + y, 2, noise=0.1).compatible_region(40.0, 0.1)
-    assert region.fraction == 0.0
-    assert region.ranges.isna().to_numpy().all()
-    with pytest.raises(DesignError, match="target_se must be finite and not negative, got -1"):
-        surface_of(lambda x, y: x, 2, noise=0.1).compatible_region(0.0, -1.0)
 
 
 def test_compatible_region_holds_the_truth_as_often_as_it_says():

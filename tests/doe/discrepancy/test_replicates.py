@@ -39,12 +39,6 @@ def test_one_replicate_has_a_mean_and_no_scatter() -> None:
     assert np.isnan(data.covariance("base")).all()
 
 
-def test_a_lost_replicate_has_no_values() -> None:
-    data = measured([[20.0, 1.0], [NAN, NAN]], reasons={"base": ("", "lost")})
-    assert data.finished_count("base") == 1
-    np.testing.assert_array_equal(data.mean("base"), [20.0, 1.0])
-
-
 def test_fewer_observables_leave_the_rest_as_it_is() -> None:
     data = measured([[20.0, 1.0], [22.0, 2.0]], notes=("a note",)).only(["height", "r50"])
     assert data.observables == ("height",)

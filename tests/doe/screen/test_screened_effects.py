@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import statsmodels.formula.api as smf
 
-from doe import DesignError, Factor, aliases, plackett_burman, screen
+from doe import DesignError, Factor, plackett_burman, screen
 
 FACTORS = [Factor(name, 0.0, 1.0) for name in "ABCDEFGH"]
 EFFECTS = np.array([4.0, 0.0, -2.0, 0.0, 0.0, 1.0, 0.0, 0.0])
@@ -98,39 +98,3 @@ def test_lenth_pseudo_error_by_hand():
     # Ye and Hamada's limit of single effects; drawn, to 0.4 % (three standard errors are 1 %).
     assert result.critical_t(0.05) == pytest.approx(2.297, rel=0.01)
     assert result.table.loc["x6", "p"] < 0.002
-
-
-def test_interaction_of_a_geometric_design_falls_into_one_column():
-    design = plackett_burman([Factor(f"x{i}", 0.0, 1.0) for i in range(7)], runs=8)
-    weights = aliases(design, "x0:x1").abs()
-    assert weights.round(12).value_counts().to_dict() == {0.0: 7, 1.0: 1}
-
-
-@pytest.mark.parametrize(
-    ("response", "message"),
-    [
-        (np.zeros(11), r"shape \(12,\) or \(12, replicates\), got \(11,\)"),
-        (np.r_[np.zeros(6), np.nan, np.zeros(5)], "nan in run 7, replicate 1"),
-        (np.where(np.arange(24) == 23, np.inf, 0.0).reshape(12, 2), "inf in run 12, replicate 2"),
-    ],
-)
-def test_response_is_checked(response, message):
-    with pytest.raises(DesignError, match=message):
-        screen(plackett_burman(FACTORS), response)
-
-
-def test_rule_and_aliased_factors_are_named():
-    design = plackett_burman(FACTORS)
-    with pytest.raises(DesignError, match="error is one of pooled, dummies, pure, lenth, got 'none'"):
-        screen(design, np.zeros(12), error="none")
-    with pytest.raises(DesignError, match="nothing to fit: all 12 observations are 5"):
-        screen(design, np.full(12, 5.0))
-    half = design.select(design.coded.index[design.coded["A"] > 0.0].repeat(2))
-    with pytest.raises(DesignError, match="A with intercept"):
-        screen(half, np.arange(12.0))
-
-
-def test_too_few_runs_are_counted():
-    design = plackett_burman(FACTORS).select([1, 2, 3])
-    with pytest.raises(DesignError, match=r"too few runs for the terms: 9 coefficients .* 3 observations"):
-        screen(design, [1.0, 2.0, 3.0])

@@ -1,4 +1,4 @@
-"""Agreement of two sets of numbers: closed forms, and noise that is taken out again."""
+"""Agreement of two sets of numbers: closed forms, and noise that is removed again."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe import DesignError, agreement
+from doe import agreement
 
 TRUTH = np.linspace(10.0, 34.0, 31)
 
@@ -63,16 +63,6 @@ def test_the_interval_of_the_bias_is_that_of_a_mean() -> None:
     assert found.bias.low < found.bias.value < found.bias.high
 
 
-def test_resampling_keeps_the_runs_of_every_stratum() -> None:
-    strata = np.repeat(["a", "b"], [11, 20])
-    values = TRUTH + np.where(strata == "a", 5.0, -5.0)
-    # The difference is constant within a stratum, so that no resample changes its mean.
-    bias = agreement(values, TRUTH, strata=strata).bias
-    assert (bias.low, bias.high) == pytest.approx((bias.value, bias.value), rel=1e-12)
-    plain = agreement(values, TRUTH).bias
-    assert plain.high - plain.low > 1.0
-
-
 def test_the_ceiling_of_normal_truths_is_the_one_of_a_normal_pair() -> None:
     # Two noisy views of normal truths are a normal pair of correlation r = the geometric mean of their
     # reliabilities, whose rank correlation is 6 / pi asin(r / 2) (Pearson 1907).
@@ -97,18 +87,3 @@ def test_runs_of_one_setting_have_one_truth() -> None:
 
 def test_a_reference_that_is_all_noise_has_no_slope() -> None:
     assert math.isnan(agreement(TRUTH, TRUTH, reference_variance=1e3).slope.value)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "rule"),
-    [
-        (([1.0, 2.0], [1.0, 2.0]), r"3 or more runs, got shapes \(2,\) and \(2,\)"),
-        (([1.0, 2.0, 3.0], [1.0, 2.0]), "the same 3 or more runs"),
-        (([1.0, 2.0, math.nan], [1.0, 2.0, 3.0]), "finite values"),
-        (([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], -1.0), "variances must be 0 or more, got -1.0"),
-        (([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], 0.0, 0.0, ["a"]), r"settings must be a label for each of 3 runs"),
-    ],
-)
-def test_wrong_input_is_refused(arguments: tuple, rule: str) -> None:
-    with pytest.raises(DesignError, match=rule):
-        agreement(*arguments)

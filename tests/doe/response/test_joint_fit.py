@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe import Design, DesignError, Factor, Goal, Sample, central_composite, joint_fit
+from doe import Design, Factor, Goal, Sample, central_composite, joint_fit
 from doe.response.quadratic import QuadraticForm
 from doe.response.region import compatible_region
 
@@ -110,16 +110,6 @@ def test_a_response_that_tells_nothing_costs_a_little_and_comes_last() -> None:
     assert table["alone"]["flat"] == 1.0
 
 
-def test_contradicting_responses_agree_nowhere() -> None:
-    fit = joint_fit({"a": goal(1.0, 1.0, target=0.5), "b": goal(1.0, 1.0, target=-0.5)})
-    assert fit.share() == 0.0
-    assert not fit.agrees()
-    tests = fit.tests()
-    # Between them, five standard errors from each.
-    np.testing.assert_allclose(tests["t"], [-5.0, 5.0], atol=0.01)
-    assert not tests["agrees"].any()
-
-
 def test_one_response_alone_is_its_own_compatible_region() -> None:
     design = central_composite(FACTORS, 1.0, 5)  # face-centred: the disc of the runs holds the whole box
     plane, aim = Plane((3.0, 2.0), se=0.2, design=design, residual_df=7.0), Sample(0.4, 0.5, 5)
@@ -147,16 +137,6 @@ def test_the_true_setting_is_compatible_as_often_as_promised() -> None:
         inside += joint_fit(goals, resolution=3).agrees({"E": 0.4, "F": 0.4})
     expected = 0.95  # to three standard errors of the count
     assert abs(inside / count - expected) < 3.0 * np.sqrt(expected * (1.0 - expected) / count)
-
-
-def test_what_cannot_be_fitted_together_is_refused() -> None:
-    with pytest.raises(DesignError, match="at least one response"):
-        joint_fit({})
-    other = central_composite((Factor("E", 0.3, 0.6), FACTORS[1]), "rotatable", 5)
-    with pytest.raises(DesignError, match=r"same factors: 'a' has .* 'b' has"):
-        joint_fit({"a": goal(1.0, 1.0), "b": Goal(Plane((1.0, 1.0), design=other), Sample(0.0, 1.0, 5))})
-    with pytest.raises(DesignError, match="target's spread"):
-        joint_fit({"a": Goal(Plane((1.0, 1.0)), Sample(0.0, 0.0, 5))})
 
 
 def test_of_two_crossings_the_one_with_the_smaller_chi2_is_chosen() -> None:
