@@ -29,16 +29,7 @@ def render_page(
 ) -> str:
     """Render the report of a campaign as one self-contained HTML page.
 
-    Parameters
-    ----------
-    campaign, study
-        What was run.
-    pictures
-        Heaps to show.
-    provenance
-        What made the numbers: names and values, nested as they come.
-    solid
-        A heap to be turned.
+    It shows pictures of heaps, a heap in three dimensions, and the nested values of the provenance.
     """
     labels = study.labels
     context = Context(campaign, labels)

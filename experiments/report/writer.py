@@ -38,19 +38,7 @@ def write_report(
 ) -> Path:
     """Write ``report.html``, ``results.json``, ``tables/*.csv``, ``material.toml``, each whole or not at all.
 
-    Parameters
-    ----------
-    campaign, study, pictures, solid
-        As of `render_page`.
-    out_dir
-        Folder of the files; it is made when it is missing.
-    provenance
-        What the caller knows of the run (device, seconds, ...), nested as it comes; versions are added.
-
-    Returns
-    -------
-    Path
-        The page.
+    The provenance has the caller's facts about the run, nested; versions are added. Return the page.
     """
     folder = Path(out_dir)
     made_by = {**(provenance or {}), "study": study_hash(study), "versions": library_versions()}

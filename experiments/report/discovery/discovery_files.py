@@ -35,19 +35,7 @@ def write_discovery(
 ) -> Path:
     """Write ``report.html``, ``results.json``, ``tables/*.csv`` and ``study-with-NAME.toml``.
 
-    Parameters
-    ----------
-    found, study, terms, settings, pictures, further, solid
-        As of `render_discovery`.
-    folder
-        Folder of the files; it is made when it is missing.
-    provenance
-        What the caller knows of the run (device, seconds, ...), nested as it comes; versions are added.
-
-    Returns
-    -------
-    Path
-        The page.
+    The provenance has the caller's facts about the run, nested; versions are added. Return the page.
     """
     made_by = {**(provenance or {}), "study": study_hash(study), "versions": library_versions()}
     files = [path.name for path in write_study_files(found, study, terms, folder)]

@@ -63,22 +63,8 @@ def render_discovery(
 ) -> str:
     """Render the report of an analysis as one self-contained HTML page.
 
-    Parameters
-    ----------
-    found, study
-        What the analysis found, and the study that it analysed.
-    terms, settings
-        The meaning of the names, and the rules of the analysis.
-    pictures
-        Heaps to show side by side.
-    files
-        Study files with the mechanism added, in the folder of the page.
-    provenance
-        What made the numbers: names and values, nested as they come.
-    further
-        Chapters that the study's companion adds.
-    solid
-        A heap to be turned.
+    It shows pictures of heaps, a heap in three dimensions, links to study files with the mechanism added,
+    the companion's further chapters, and the nested values of the provenance.
     """
     if found.verdict is Verdict.NOT_IDENTIFIABLE:
         # A fit with nothing left to test it by would fill the page with zeros.

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import pandas as pd
 from markupsafe import Markup
 
 from experiments.report.kit.table import Table
@@ -43,29 +44,19 @@ def latex_text(text: str) -> str:
 
 
 def latex_table(table: Table, label: str) -> str:
-    """Write a table as a float with booktabs; its note stands below it."""
+    """Write a table as a float with booktabs, with its note below it."""
     heads = [
         f"{column.head} [{column.unit}]" if column.unit else str(column.head) for column in table.columns
     ]
-    rows = [[Markup(cell.text).striptags() for cell in row.cells] for row in table.rows]
-    aligned = "".join("l" if column.kind == "text" else "r" for column in table.columns)
-    lines = [
-        r"\begin{table}",
-        r"  \centering",
-        rf"  \caption{{{latex_text(table.caption)}}}",
-        rf"  \label{{tab:{label}}}",
-        rf"  \begin{{tabular}}{{{aligned}}}",
-        r"    \toprule",
-        _line(heads),
-        r"    \midrule",
-        *(_line(row) for row in rows),
-        r"    \bottomrule",
-        r"  \end{tabular}",
-        *([rf"  \par\smallskip {latex_text(table.note)}"] if table.note else []),
-        r"\end{table}",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _line(cells: list[str]) -> str:
-    return f"    {' & '.join(map(latex_text, cells))} \\\\"
+    rows = [[latex_text(Markup(cell.text).striptags()) for cell in row.cells] for row in table.rows]
+    text: str = pd.DataFrame(rows, columns=list(map(latex_text, heads))).to_latex(
+        index=False,
+        escape=False,
+        caption=latex_text(table.caption),
+        label=f"tab:{label}",
+        column_format="".join("l" if column.kind == "text" else "r" for column in table.columns),
+    )
+    note = f"\\par\\smallskip {latex_text(table.note)}\n" if table.note else ""
+    return text.replace("\\end{table}", f"{note}\\end{{table}}").replace(
+        "\\begin{table}", "\\begin{table}\n\\centering"
+    )

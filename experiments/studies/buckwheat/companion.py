@@ -88,7 +88,8 @@ def _surface_tables(result: SurfaceResult) -> dict[str, Table]:
     }
     shown: Layout = ["measure", *columns("share", **heads)]
     tables["quality"] = make_table("paper-quality", quality, shown, "Quality of the fits.")
-    coefficients = pd.DataFrame({name: surface.coefficients for name, surface in papers.items()})
+    full, reduced = (papers[name].coefficients for name in MODELS)
+    coefficients = pd.DataFrame({"full": full, "reduced": reduced}).loc[full.index]
     caption = "Coefficients of the paper's models, natural units."
     layout: Layout = ["term", *columns("sum", "°", full="full", reduced="reduced")]
     tables["coefficients"] = make_table(
@@ -98,7 +99,8 @@ def _surface_tables(result: SurfaceResult) -> dict[str, Table]:
 
 
 def _with_paper(own: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
-    return own.join(published[list(TEST)].add_prefix("paper_"))
+    tested = own.dropna(subset=["F"])
+    return tested.join(published[list(TEST)].add_prefix("paper_"))
 
 
 def _tests() -> list[Column]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from functools import cache
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,10 +13,10 @@ from analytic_heaps import Runner, analytic_heaps, study_with
 from discoveries import made_discovery, made_terms
 from plotly.offline import get_plotlyjs
 
-from doe.discrepancy import Discovery, Verdict
+from doe.discrepancy import Discovery, Settings, Verdict
 from experiments.calibrate import Campaign, calibrate
-from experiments.report import render_page
-from experiments.report.discovery import Terms
+from experiments.report import HeapPicture, render_page
+from experiments.report.discovery import Terms, render_discovery
 from experiments.report.kit import html
 from experiments.studyfile import Study, load_study
 
@@ -157,3 +158,16 @@ def whole_study() -> Study:
 @pytest.fixture(scope="session")
 def terms(whole_study: Study) -> Terms:
     return made_terms(whole_study)
+
+
+@pytest.fixture(scope="session")
+def discovery_page(terms: Terms, whole_study: Study) -> Callable[[Verdict], Page]:
+    """Take the page of each verdict apart once."""
+
+    @cache
+    def page(verdict: Verdict) -> Page:
+        picture = HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8))
+        about = ([picture], ["study-with.toml"], {"device": "cpu"})
+        return Page(render_discovery(made_discovery(verdict), whole_study, terms, Settings(), *about))
+
+    return page

@@ -6,12 +6,12 @@ import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from doe.discrepancy import Answer, Discovery, Interval, Question, Settings, Slip, Verdict
-from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
 from experiments.report.discovery.disagreement import conventions, misses, slip_sentences
 from experiments.report.discovery.discovery_tables import SHOWN_PAIRS, data_table, shown_candidates
@@ -21,18 +21,14 @@ from experiments.report.discovery.terms import percent
 from experiments.studyfile import Study
 
 Discovered = Callable[[Verdict], Discovery]
+Pages = Callable[[Verdict], Any]
 
 
 @pytest.mark.parametrize("verdict", Verdict)
 def test_every_verdict_has_a_page_that_is_whole(
-    verdict: Verdict, discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+    verdict: Verdict, discovered: Discovered, discovery_page: Pages
 ) -> None:
-    found = discovered(verdict)
-    picture = HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8))
-    text = render_discovery(
-        found, whole_study, terms, Settings(), [picture], ["study-with.toml"], {"device": "cpu"}
-    )
-    page = read_page(text)
+    found, page = discovered(verdict), discovery_page(verdict)
     assert page.mismatches == []
     assert [name for name, count in Counter(page.ids).items() if count > 1] == []
     links = [link for link in page.links if not link.startswith("data:")]
@@ -56,14 +52,14 @@ def test_a_named_effect_is_told_with_its_size_and_what_it_removed(
 
 
 def test_no_share_is_told_of_an_excess_that_is_not_there(
-    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type, discovery_page: Pages
 ) -> None:
     # A gap may be found by the fall of Q that a mechanism brings, though Q itself is within its noise.
     found = discovered(Verdict.TIE)
     assert found.base is not None
     quiet = replace(found, base=replace(found.base, q=found.base.degrees_of_freedom - 1.0))
-    for one, words in ((found, True), (quiet, False)):
-        page = read_page(render_discovery(one, whole_study, terms, Settings()))
+    quiet_page = read_page(render_discovery(quiet, whole_study, terms, Settings()))
+    for page, words in ((discovery_page(Verdict.TIE), True), (quiet_page, False)):
         assert ("explained-chart" in page.charts) is words
         assert (page.rows("candidates")[0][2][1] is not None) is words
     sentence = verdict_sentence(replace(quiet, verdict=Verdict.UNKNOWN), terms)
@@ -137,11 +133,8 @@ def test_the_other_verdicts_name_nothing_as_missing(discovered: Discovered, term
     assert unclear == discovered(Verdict.NOT_IDENTIFIABLE).reason
 
 
-def test_the_maps_show_the_residuals_of_both_models(
-    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
-) -> None:
-    found = discovered(Verdict.NAMED)
-    page = read_page(render_discovery(found, whole_study, terms, Settings()))
+def test_the_maps_show_the_residuals_of_both_models(discovered: Discovered, discovery_page: Pages) -> None:
+    found, page = discovered(Verdict.NAMED), discovery_page(Verdict.NAMED)
     assert found.base is not None
     assert found.chosen is not None
     for name, fit in (("residuals-before", found.base), ("residuals-after", found.chosen)):
@@ -154,11 +147,8 @@ def test_the_maps_show_the_residuals_of_both_models(
         assert sum("*" in t for row in drawn["text"] for t in row) == int((fit.adjusted_p < 0.05).sum())
 
 
-def test_only_what_was_measured_is_compared(
-    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
-) -> None:
-    found = discovered(Verdict.NAMED)
-    page = read_page(render_discovery(found, whole_study, terms, Settings()))
+def test_only_what_was_measured_is_compared(discovered: Discovered, discovery_page: Pages) -> None:
+    found, page = discovered(Verdict.NAMED), discovery_page(Verdict.NAMED)
     drawn = {name: chart for name, chart in page.charts.items() if name.startswith("compared-")}
     assert len(drawn) == len(found.data.observables)
     for name, chart in drawn.items():
@@ -170,10 +160,10 @@ def test_only_what_was_measured_is_compared(
 
 
 def test_candidates_stand_in_their_order_with_their_judgement(
-    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+    discovered: Discovered, discovery_page: Pages, terms: Terms
 ) -> None:
     found = discovered(Verdict.NAMED)
-    rows = read_page(render_discovery(found, whole_study, terms, Settings())).rows("candidates")
+    rows = discovery_page(Verdict.NAMED).rows("candidates")
     for row, candidate in zip(rows, found.candidates, strict=True):
         assert row[1][0] == terms.titles(candidate.mechanisms)
         assert row[2][1] == 100.0 * candidate.explained
