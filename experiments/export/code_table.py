@@ -56,7 +56,7 @@ def code_exporter(
     """Make the exporter of the code with a table; `translate` writes the input of its tests."""
     table = code_table(name)
     code, source = table["code"], table["source"]
-    laws = LawsOfCode(code, table["laws"], table.get("nearest", {}))
+    laws = code_laws(name)
 
     def material_terms(material: Material) -> tuple[Term, ...]:
         return tuple(_terms(table.get("material", {}), material, {}, source))
@@ -78,6 +78,13 @@ def code_exporter(
         table.get("unproven", ""),
     )
     return exporter
+
+
+@cache
+def code_laws(name: str) -> LawsOfCode:
+    """Return the contact laws of the code with a table."""
+    table = code_table(name)
+    return LawsOfCode(table["code"], table["laws"], table.get("nearest", {}))
 
 
 @cache

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.export import lammps_text as text
-from experiments.export.code_table import CodeTest, code_exporter
+from experiments.export.code_table import CodeTest, code_exporter, code_laws
 from experiments.export.contact import Contact, values
 from experiments.export.exporter import Translation
 from experiments.export.laws import Translated
@@ -134,7 +134,7 @@ def _setup(test: CodeTest) -> str:
     plate, gravity = f"fix plate all wall/gran granular {with_plate} zplane 0 NULL\n", _gravity(lift)
     rain_top = lift.rain_bottom + lift.rain_height
     if scene.plate_diameter is not None:
-        plate = _plate(lift, with_plate, bottom)
+        plate = _plate(lift, scene.plate_diameter / 2, with_plate, bottom)
         bottom -= LOOK * math.sqrt(scene.rain_speed**2 + 2.0 * gravity * rain_top) + lift.reach
     sides = (-half_width, half_width, -half_width, half_width, bottom, rain_top + 2.0 * lift.reach)
     names = " ".join(text.molecule_file(n) for n in range(1, len(lift.templates) + 1))
@@ -162,9 +162,9 @@ def _setup(test: CodeTest) -> str:
     return "".join(parts)
 
 
-def _plate(lift: Lift, words: str, bottom: float) -> str:
+def _plate(lift: Lift, radius: float, words: str, bottom: float) -> str:
     return _PLATE.format(
-        radius=lift.scene.plate_diameter / 2,
+        radius=radius,
         middle=bottom / 2,
         words=words,
         bottom=bottom,
@@ -272,3 +272,6 @@ def tsuji_restitution(damping: float) -> float:
 
 
 LAMMPS = code_exporter("lammps", translate, contact_numbers)
+
+CONVENTIONS = code_laws("lammps")
+"""Contact laws that it has."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.export import liggghts_text as text
-from experiments.export.code_table import CodeTest, code_exporter
+from experiments.export.code_table import CodeTest, code_exporter, code_laws
 from experiments.export.exporter import Translation
 from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift, disc, prism, stl_text
@@ -126,3 +126,6 @@ def _lifting(lift: Lift) -> list[str]:
 
 
 LIGGGHTS = code_exporter("liggghts", translate)
+
+CONVENTIONS = code_laws("liggghts")
+"""Contact laws that it has."""

@@ -17,7 +17,7 @@ from experiments.evidence.trials.other_codes.code_surfaces import BIN, FILL_MARG
 from experiments.evidence.trials.other_codes.dump_reading import DRAG, FRAMES
 from experiments.export import Contact
 from experiments.export import lammps_text as text
-from experiments.export.lammps_exporter import LAMMPS, granular_words
+from experiments.export.lammps_exporter import CONVENTIONS, granular_words
 from experiments.export.script_text import clear_loop, rest_loop, watched
 from experiments.io.errors import InputError
 
@@ -213,7 +213,7 @@ def _words(
     bench: Bench, contact: Contact, first_odd: bool, second_odd: bool = False, energy: float = 0.0
 ) -> str:
     """Write a contact whose first or second grain may be of the other kind."""
-    scene, laws = bench.scene, LAMMPS.conventions.nearest_laws(bench.case.laws)
+    scene, laws = bench.scene, CONVENTIONS.nearest_laws(bench.case.laws)
 
     def softened(material: Material, is_odd: bool) -> Material:
         factor = scene.odd_modulus if is_odd else 1.0
@@ -223,7 +223,7 @@ def _words(
     surface = replace(contact.surface, static_friction=factor * contact.surface.static_friction)
     first, second = softened(contact.first, first_odd), softened(contact.second, second_odd)
     coefficients = ContactCoefficients.of_pair(first, second, surface, laws, (), contact.radius, contact.mass)
-    return granular_words(replace(contact, coefficients=coefficients), LAMMPS.conventions.words(laws), energy)
+    return granular_words(replace(contact, coefficients=coefficients), CONVENTIONS.words(laws), energy)
 
 
 def surface_energy(work: float) -> float:

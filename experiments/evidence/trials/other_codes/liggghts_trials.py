@@ -14,7 +14,7 @@ from experiments.evidence.trials.other_codes.odd_lift import OddLift
 from experiments.export import liggghts_text as text
 from experiments.export import values
 from experiments.export.lift import prism, stl_text
-from experiments.export.liggghts_exporter import LIGGGHTS
+from experiments.export.liggghts_exporter import CONVENTIONS, LIGGGHTS
 from experiments.export.script_text import Rain, clear_loop, plain, rest_loop, watched
 
 INPUT, TUBE, PLATE = "lift.in", "tube.stl", "plate.stl"
@@ -101,7 +101,7 @@ def _setup(bench: Bench) -> str:
     scene, lift, look = bench.scene, bench.lift, bench.look_steps
     half_width, _, bottom = scene.room(lift.reach)
     top = max(bench.rain_top, (1.0 + GONE) * scene.height) + 4.0 * lift.reach
-    words = LIGGGHTS.conventions.words(LIGGGHTS.conventions.nearest_laws(bench.case.laws))
+    words = CONVENTIONS.words(CONVENTIONS.nearest_laws(bench.case.laws))
     cohesion, numbers = _cohesion(bench)
     pair_model = text.model_words(words | {"cohesion": cohesion})
     fill = lift.steps(lift.count / bench.rain_rate + FILL_MARGIN)

@@ -21,7 +21,7 @@ from experiments.evidence.verification.problems.contact_paths import (
     result_of,
 )
 from experiments.export import lammps_text as text
-from experiments.export.lammps_exporter import LAMMPS, granular_words
+from experiments.export.lammps_exporter import CONVENTIONS, granular_words
 
 TEXT = """\
 Two spheres, and a sphere on a plate, are followed in LAMMPS (`lmp`, Debian) with the coefficients that
@@ -67,7 +67,7 @@ def _falls(path: ContactPath, folder: Path, device: str) -> Row:
 
 def follow(setup: PathSetup, folder: Path) -> Trajectory:
     """Follow one path in LAMMPS."""
-    words = granular_words(setup.contact, LAMMPS.conventions.words(setup.laws))
+    words = granular_words(setup.contact, CONVENTIONS.words(setup.laws))
     parts = [
         text.head("array sort 0 0"),
         text.box(box_of(setup)),

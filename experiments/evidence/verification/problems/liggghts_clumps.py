@@ -18,7 +18,7 @@ from experiments.evidence.verification.problems.setups import bodies, world
 from experiments.export import Contact, values
 from experiments.export import liggghts_text as text
 from experiments.export.lift import Template
-from experiments.export.liggghts_exporter import LIGGGHTS
+from experiments.export.liggghts_exporter import CONVENTIONS, LIGGGHTS
 from experiments.grains.spheres import read_clump
 
 TEXT = """\
@@ -149,7 +149,7 @@ def _in_liggghts(meeting: Meeting, shape: ClumpShape, contact: Contact, folder: 
     count, steps = shape.sphere_count, CHUNKS * CHUNK
     half, terms = APART * (0.5 * PAIRS + 1.0), values(LIGGGHTS.contact_terms(contact))
     properties = text.properties([values(LIGGGHTS.material_terms(GRAIN))], lambda i, j: terms)
-    model = text.model_words(LIGGGHTS.conventions.words(LAWS))
+    model = text.model_words(CONVENTIONS.words(LAWS))
     commands = text.head(("grains",), (-half, half, -0.03, 0.03, -0.03, 0.03), 0.001, sort="sort 0 0")
     commands += text.contacts(properties, model, STEP)
     commands += _RUN.format(

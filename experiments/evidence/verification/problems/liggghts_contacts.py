@@ -19,7 +19,7 @@ from experiments.evidence.verification.problems.contact_paths import (
 from experiments.evidence.verification.problems.setups import STEEL
 from experiments.export import liggghts_text as text
 from experiments.export import values
-from experiments.export.liggghts_exporter import LIGGGHTS
+from experiments.export.liggghts_exporter import CONVENTIONS, LIGGGHTS
 
 TEXT = """\
 Two spheres, and a sphere on a plate, are followed in LIGGGHTS (`liggghts`, Debian) with the coefficients that
@@ -47,7 +47,7 @@ def paths(laws: ContactLaws) -> list[PathSetup]:
 
 def follow(setup: PathSetup, folder: Path) -> Trajectory:
     """Follow one path in LIGGGHTS."""
-    model = text.model_words(LIGGGHTS.conventions.words(setup.laws))
+    model = text.model_words(CONVENTIONS.words(setup.laws))
     materials = [values(LIGGGHTS.material_terms(each)) for each in (setup.grain, STEEL)]
     terms = values(LIGGGHTS.contact_terms(setup.contact))
     parts = [
