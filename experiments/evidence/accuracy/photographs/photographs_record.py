@@ -32,7 +32,7 @@ COLUMNS = (
     "kind", "seed", "outcome", "truth", "mean", "error", "se", "covered", "elevation", "seen_elevation",
     "distance", "shadow", "why",
 )  # fmt: skip
-TILE, TILES_ACROSS, SHEET_TILES = (300, 220), 6, 36
+TILE, TILES_ACROSS, SHEET_TILES = (300, 220), 6, 12
 Row = dict[str, Any]
 Task = tuple[Callable[[Any], tuple[Row, Picture]], Any]
 """Function that measures one picture, and the seed or the file of the picture."""

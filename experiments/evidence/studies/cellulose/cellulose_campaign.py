@@ -30,7 +30,7 @@ from experiments.io.errors import InputError
 from experiments.io.files import write_text
 from experiments.io.program_version import with_version
 
-CURVES, FACTS, PREDICTION = "curves.csv", "provenance.json", "prediction.csv"
+CURVES, FACTS, PREDICTION = "curves.csv.xz", "provenance.json", "prediction.csv"
 """Files of a record: averaged edges of all drums, what made them, and the sealed prediction."""
 
 

@@ -13,7 +13,7 @@ from dem_warp.checkpoint import case_name
 from experiments.cases import OwnWorkers, Store
 from experiments.evidence.studies.cellulose.cellulose_plan import case_of, places
 from experiments.evidence.studies.cellulose.drum_edges import EdgeWatch, edge_file, read_edges
-from experiments.io.files import write_text
+from experiments.io.files import replacing, write_text
 from experiments.studyfile import Study
 
 LEVELS = (0.2, 0.5, 0.8)
@@ -97,7 +97,8 @@ def write_curves(path: Path, table: pd.DataFrame, curves: dict[float, np.ndarray
     for dark, rows in curves.items():
         frame = pd.DataFrame(np.round(rows, 3), columns=names)
         frames.append(pd.concat([table.assign(dark=dark), frame], axis=1))
-    write_text(path, pd.concat(frames, ignore_index=True).to_csv(index=False))
+    with replacing(path) as temporary:
+        pd.concat(frames, ignore_index=True).to_csv(temporary, index=False, compression="xz")
 
 
 def read_curves(path: Path) -> tuple[pd.DataFrame, dict[float, np.ndarray]]:

@@ -73,7 +73,7 @@ def _parts(
     )
     return [
         f"# {study.name}",
-        "Written by `python -m experiments.evidence.studies.cellulose page`; `curves.csv` holds the averaged edges of "
+        "Written by `python -m experiments.evidence.studies.cellulose page`; `curves.csv.xz` holds the averaged edges of "
         "all drums, `residuals.csv` how far each one is off, `prediction.csv` the prediction.",
         study.note,
         "## Measured and simulated surfaces",

@@ -10,6 +10,7 @@ DEM-Engine needs a GPU, and its states are kept beside this file:
 from __future__ import annotations
 
 import json
+import lzma
 import math
 import tempfile
 from dataclasses import replace
@@ -59,7 +60,7 @@ border: it drifts across its way by a voxel a step from the impact on, and keeps
 EXPLAINED = ("pair, normal", "pair, twisting", "plate, normal", "plate, oblique")
 """Paths whose difference the text explains."""
 
-PROGRAM, STATES = "deme_path.txt", "deme_states.json"
+PROGRAM, STATES = "deme_path.txt", "deme_states.json.xz"
 
 EQUAL = (RADII[0], RADII[0])
 """Radii of the pair [m]."""
@@ -70,7 +71,7 @@ def deme_contacts(device: str) -> Result:
     kept = Path(__file__).with_name(STATES)
     if not kept.is_file():
         raise ValueError(f"{STATES}: the states of DEM-Engine must be kept first, found none")
-    stored = json.loads(kept.read_text(encoding="utf-8"))
+    stored = json.loads(lzma.decompress(kept.read_bytes()))
 
     theirs = {name: trajectory_of(states) for name, states in stored["paths"].items()}
     setups = {name: replace(setup, start=theirs[name].positions[0]) for name, setup in _setups().items()}
@@ -131,8 +132,8 @@ def write(folder: Folder) -> None:
 @app.command()
 def keep(folder: Folder) -> None:
     """Keep the states that the program left."""
-    states = (folder / "states.json").read_text(encoding="utf-8")
-    write_text(Path(__file__).with_name(STATES), states + "\n")
+    states = lzma.compress((folder / "states.json").read_bytes())
+    Path(__file__).with_name(STATES).write_bytes(states)
 
 
 if __name__ == "__main__":
