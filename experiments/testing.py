@@ -57,7 +57,8 @@ def _require_same(one: CaseResult, other: CaseResult, what: str) -> None:
 
 def engine_answers_each_case_in_order(engine: Engine, case: Case[Any]) -> None:
     """Check that every result comes once, in the order of the cases, whatever else is simulated with it."""
-    cases, handed = _seeded(case), {}
+    cases = _seeded(case)
+    handed: dict[int, CaseResult] = {}
     results = engine(cases, on_result=lambda index, result: handed.setdefault(index, result))
     require(len(results) == len(cases), f"{len(cases)} cases gave {len(results)} results")
     require(sorted(handed) == [0, 1, 2], f"on_result got the indices {sorted(handed)}, not 0, 1 and 2")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from experiments.studyfile import Study
 
 LONGEST_REASON = 300
-"""Characters of a case's reason that the end of a campaign tells."""
+"""Characters of a case's reason that the end of a campaign shows."""
 
 Runner = Callable[[pd.DataFrame], pd.DataFrame]
 """Simulates all rows of a table at once and returns them in order, ``status`` and observables added."""
@@ -113,7 +113,7 @@ def values_of(cases: pd.DataFrame, stage: str, response: Response, least: int = 
 
 
 def response_table(cases: pd.DataFrame, response: Response, runs: Sequence[int]) -> np.ndarray:
-    """Return a response by run and replicate, shape (runs, replicates); NaN where there is none."""
+    """Return a response by run and replicate, shape (runs, replicates); NaN where there is no value."""
     values = measured(cases, response).pivot_table(response.observable, "run", "replicate")
     columns = range(1, int(cases["replicate"].max()) + 1)
     return values.reindex(index=list(runs), columns=columns).to_numpy(dtype=np.float64)
@@ -149,10 +149,10 @@ def too_many_failed(cases: pd.DataFrame, stage: str, need: str, response: Respon
     """Return the end of a campaign whose stage cannot be analysed."""
     failures = failure_summary(cases, response) or "no case failed"
     reason = f"The stage {stage.replace('_', ' ')} {need} for {response.name}; {failures}."
-    told, count = _commonest_reason(cases, response)
-    if told:
-        reason += f" The reason of {count} of them: {shortened(told, LONGEST_REASON).rstrip('.')}."
-    if not told or "time limit" in told:
+    shared, count = _commonest_reason(cases, response)
+    if shared:
+        reason += f" The reason of {count} of them: {shortened(shared, LONGEST_REASON).rstrip('.')}."
+    if not shared or "time limit" in shared:
         reason += (
             " See the reasons in the case table, then widen the time limit or narrow the factors' ranges."
         )

@@ -45,7 +45,7 @@ from experiments.studyfile.campaign import ClimbSettings, Response
 STAGE = "climb"
 
 LEAST_STEPS = 2
-"""Steps with a value below which a path tells nothing."""
+"""Steps with a value below which a path has no direction."""
 
 
 @dataclass(frozen=True)

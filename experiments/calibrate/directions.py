@@ -32,7 +32,7 @@ def with_directions(
     design, screening
         The screening design, and its cases.
     hidden
-        Cases of a twin study's target; else none.
+        Cases of a twin study's target; else empty.
 
     Returns
     -------

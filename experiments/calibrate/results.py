@@ -4,7 +4,7 @@ A stage that simulates keeps its ``cases``: one row a case as the runner returne
 natural unit, ``seed``, ``stage``, ``scene``, ``run``, ``replicate``, ``status``, ``reason``, observables,
 ``case_key``). Failed cases stay in it. Runs and replicates count from 1.
 
-Results of a stage stand in its ``responses``, by the name of the response and in its unit; the first leads.
+Results of a stage are in its ``responses``, by the name of the response and in its unit; the first leads.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Outcome(StrEnum):
     """Ending of a campaign.
 
     Fresh cases at the chosen point are shown to be equivalent to the target (calibrated), they differ from it
-    (missed), or there are too few of either to tell; the others end before.
+    (missed), or there are too few of either to decide; the others end before.
     """
 
     CALIBRATED = "calibrated"
@@ -82,7 +82,7 @@ class StageResult:
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Tables by file name (without ending), beside the cases."""
+        """Return tables by file name (without ending), without the cases."""
         return {}
 
 
@@ -143,7 +143,7 @@ class ScreeningResult(_ByResponse[Screened]):
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The coded design with each response of each replicate, the effects, the analyses of variance."""
+        """Return the coded design with its responses, the effects and the analyses of variance."""
         values = {
             f"{name}_{i}": column
             for name, found in self.responses.items()
@@ -170,7 +170,7 @@ class SelectionResult(StageResult):
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Reason that each factor was kept or not."""
+        """Return the reason that each factor was kept or not."""
         return {"selection": self.table}
 
 
@@ -196,7 +196,7 @@ class ClimbResult(StageResult):
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The path."""
+        """Return the path."""
         return {"climb": self.path}
 
     @property
@@ -231,7 +231,7 @@ class SurfaceResult(_ByResponse[FittedResponse]):
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The design in both units with its responses, the analyses of variance, runs outside the ranges."""
+        """Return the design in both units, the analyses of variance and runs outside the ranges."""
         coded = self.design.coded.add_suffix("_coded")
         values = {name: found.measured for name, found in self.responses.items()}
         return {
@@ -283,7 +283,7 @@ class OptimumResult(StageResult):
     """All responses together; None where there is one."""
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The contour, the range of each factor over the compatible region, the joint fit."""
+        """Return the contour, the compatible range of each factor and the joint fit."""
         tables = {"contour": self.contour, "compatible_ranges": self.region.ranges}
         if self.joint is not None:
             tables["joint_responses"] = self.joint.tests(self.point)
@@ -302,7 +302,7 @@ class VerificationResult(_ByResponse[Comparison]):
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The fresh cases."""
+        """Return the fresh cases."""
         return {"verification": self.cases}
 
 
@@ -358,11 +358,11 @@ class Campaign:
         return groups[["simulated_time", "grain_time"]].sum().assign(cases=groups.size())
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain JSON data: text, finite numbers, lists and dicts; other numbers are null."""
+        """Return everything as plain JSON data; numbers that are not finite are null."""
         return {field.name: jsonable(getattr(self, field.name)) for field in fields(self)}
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Tables of every stage that was reached, for CSV files: a named index is a column."""
+        """Return tables of every stage that was reached, for CSV files: a named index is a column."""
         tables = {"cases": self.cases, "factors": pd.DataFrame([jsonable(f) for f in self.factors])}
         for result in self.stages.values():
             tables |= result.tables()

@@ -59,7 +59,7 @@ def analyse_screening(
 
 
 def _screen(design: Design, cases: pd.DataFrame, response: Response) -> ScreenResult:
-    """Test against the dummies; where there are none, against Lenth's pseudo error."""
+    """Test against the dummies; where there are no dummies, against Lenth's pseudo error."""
     used = measured(cases, response)
     try:
         run = design.select(used["run"].tolist())

@@ -74,7 +74,7 @@ def require_kept(study: Study, selection: SelectionResult) -> None:
 def _by_strength(p: pd.DataFrame, alpha: float) -> list[str]:
     """Order the factors: those that move the leading response, as the climb needs, then by their smallest p.
 
-    The rows stand in the order of the effects on the leading response.
+    The rows are in the order of the effects on the leading response.
     """
 
     def order(name: str) -> tuple[bool, float]:

@@ -46,7 +46,7 @@ def calibrate(study: Study, runner: Runner, on_stage: StageHook | None = None) -
     ----------
     runner
         Simulates all rows of a table at once, each in its ``scene``, and returns them with ``status``,
-        ``reason`` and observables, NaN where there is none; a case that fails is a row,
+        ``reason`` and observables, NaN where there is no value; a case that fails is a row,
         never an exception. Called once for the target, the noise floor and the screening together, then once
         for each batch of the climb, for the surface and for the verification.
     on_stage

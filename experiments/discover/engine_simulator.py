@@ -58,9 +58,9 @@ class EngineSimulator:
     ) -> None:
         self.study, self.table, self.engine = study, table, engine or engine_of(study)
         names = [each.name for each in study.measurable]
-        told = getattr(self.engine, "observables", names)
+        reported = getattr(self.engine, "observables", names)
         seen = [name for name in names if name in BY_NAME and BY_NAME[name].by_photograph]
-        self.observables = tuple(name for name in names if name in (*seen, *told))
+        self.observables = tuple(name for name in names if name in (*seen, *reported))
         """Names of what it answers with."""
         self._runner = WaveRunner(study.measurement, table, workers, progress, self.engine, self.observables)
         self._library = {mechanism.name: mechanism for mechanism in library}
@@ -135,7 +135,7 @@ class EngineSimulator:
 
     def key(self, case: Case) -> str:
         """Key of a case: a hash of all that determines its observables."""
-        reading = {"measurement": self.study.measurement.told, "observables": VERSION}
+        reading = {"measurement": self.study.measurement.settings, "observables": VERSION}
         return case_key(case, self.engine, **reading)
 
     def _extend(self, names: tuple[str, ...], condition: str) -> Study:

@@ -29,8 +29,8 @@ def search_cases(settings: Settings, conditions: int) -> tuple[int, int]:
 def cases_for(search: Search, measured: Measured, bank: Bank | None, seed: int) -> tuple[int, int]:
     """Cases that an analysis of measured data asks for: likely, and at the most.
 
-    It asks for none where too few means were measured. Where there is a bank, it is begun: without a gap it
-    asks for none either, and where a value may be a slip it goes through the data twice.
+    Too few measured means need no case. A bank is searched for a gap first: without a gap no case is needed,
+    and where a value may be a slip the data are analysed twice.
     """
     if _fitted_means(search, measured) - len(search.study.factors) < LEAST_FREEDOM:
         return 0, 0

@@ -26,7 +26,7 @@ def maker_of_today(commit: str = "", engine: Engine | None = None) -> dict[str, 
 
 
 def notes_on(maker: Mapping[str, str], engine: Engine | None = None) -> list[str]:
-    """Say that a bank comes from another engine than fresh runs, or that it does not tell."""
+    """Return a note where another or an unknown engine than that of fresh runs made the bank."""
     if not maker:
         return ["the bank does not say which engine made it"]
     if maker["engine"] == fingerprint_of(engine):

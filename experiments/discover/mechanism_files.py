@@ -48,7 +48,6 @@ class Scaled(Section):
     """The scale."""
 
     def value(self, scales: Mapping[str, float]) -> float:
-        """[SI]"""
         return self.times * scales[self.of]
 
 
@@ -64,13 +63,13 @@ class MechanismFile(Section):
     parameters: Parameters
     """Place of the parameter in a study; of one value, where there are several."""
     unit: str
-    """Unit of its size, ``1`` for none."""
+    """Unit of its size, ``1`` for a plain number."""
     null: float = Field(ge=0.0)
     """Size at which it has no effect; a study may start from more."""
     maximum: Scaled | Annotated[float, Field(gt=0.0)]
     """Largest size that is searched."""
     reduced_maximum: float | None = Field(default=None, gt=0.0)
-    """The largest where the study's resistance to rolling has the lever R*; left out: the same."""
+    """The largest where the study's resistance to rolling has the lever R*. Default: the same."""
     source: str
     """Source of law and range."""
     confirm: str
@@ -78,7 +77,7 @@ class MechanismFile(Section):
     directed: bool = False
     """It has a direction: the test has it along x, a laboratory anywhere."""
     saturation: float | None = Field(default=None, gt=0.0)
-    """Distance from the null over which what a step adds falls to 1/e; left out: all steps add the same."""
+    """Distance from the null over which what a step adds falls to 1/e. Default: all steps add the same."""
     companions: dict[str, Scaled | float | str] = Field(default_factory=dict)
     """Further settings that it needs in a study, by place; without effect while it is at its null."""
 
@@ -101,8 +100,8 @@ FILES: Mapping[str, Path] = Registry(
 def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[MechanismFactor, ...]:
     """Read the mechanisms that a study may lack from files by their names, in alphabetical order.
 
-    One that the study cannot have is left out: its test has no such setting, a factor varies it already, it
-    stands at the maximum, or something else in the study excludes it.
+    Without those that the study cannot have: its test has no such setting, a factor varies it already, it
+    is at the maximum, or something else in the study excludes it.
 
     Raises
     ------
@@ -160,8 +159,8 @@ def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float])
     if null is None or any(other != null for other in others) or null >= maximum:
         return None
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
-    told = {"title", "sentence", "kind", "parameters", "unit", "source", "confirm", "directed", "saturation"}
-    shared = file.model_dump(include=told)
+    kept = {"title", "sentence", "kind", "parameters", "unit", "source", "confirm", "directed", "saturation"}
+    shared = file.model_dump(include=kept)
     return MechanismFactor(name, **shared, null=null, maximum=maximum, companions=companions)
 
 

@@ -91,9 +91,11 @@ class Search:
         """Hash of all of the study that determines a heap at given factors."""
         described = describe(self.study)
         document = {key: value for key, value in described["study"].items() if key not in WITHOUT_EFFECT}
-        if "condition" in document:  # from where heaps are looked at changes none
-            told = document["condition"].items()
-            document["condition"] = {n: {k: v for k, v in each.items() if k != "camera"} for n, each in told}
+        if "condition" in document:  # the camera changes no heap
+            conditions = document["condition"].items()
+            document["condition"] = {
+                n: {k: v for k, v in each.items() if k != "camera"} for n, each in conditions
+            }
         if "measurement" in document:  # outlines are more to see of the same heaps
             document["measurement"] = {k: v for k, v in document["measurement"].items() if k != "outline"}
         if self.study.solver.laws == EDEM:
@@ -104,7 +106,7 @@ class Search:
         return hashlib.sha256(text.encode()).hexdigest()
 
     def make_bank(self, simulator: Simulator, maker: Mapping[str, str] | None = None) -> Bank:
-        """Run the library waves, all in one call; ``maker`` tells of the engine behind the simulator.
+        """Simulate the points of the bank in one call; ``maker`` describes the engine of the simulator.
 
         Raises
         ------

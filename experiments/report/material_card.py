@@ -75,7 +75,7 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
         "scale": study.scale,
         "study": study_hash(study),
         "estimator": f"repose angle, {measurement.fit!r} fit, mean of {measurement.azimuths} views",
-        "measurement": measurement.told,
+        "measurement": measurement.settings,
         "numerics": numerics.model_dump(exclude_none=True),
         "response": {response.name: _response(campaign, response) for response in campaign.responses},
     }

@@ -74,9 +74,9 @@ class ScreeningSettings(Section):
     design: str = "plackett-burman"
     """Name of the design; packages from outside add further ones."""
     runs: int | None = Field(default=None, ge=4, le=MOST, multiple_of=4)
-    """Runs of the design; left out: the fewest that leave ``dummies`` columns free."""
+    """Runs of the design. Default: the fewest that leave ``dummies`` columns free."""
     dummies: int = Field(default=3, ge=0, le=MOST)
-    """Dummy columns wanted when ``runs`` is left out: each is one degree of freedom of the error."""
+    """Dummy columns wanted when ``runs`` is omitted: each is one degree of freedom of the error."""
     replicates: int = Field(default=1, ge=1, le=MOST)
     """Cases of each run."""
 
@@ -85,7 +85,7 @@ class SelectionSettings(Section):
     """Stage (c): which factors are kept."""
 
     keep: tuple[str, ...] | None = Field(default=None, min_length=1)
-    """Names of the factors to keep; left out: by the rule below."""
+    """Names of the factors to keep. Default: by the rule below."""
     alpha: float = Field(default=0.10, gt=0.0, lt=1.0)
     """A factor is kept when its p value is below this."""
     at_least: int = Field(default=0, ge=0)
@@ -110,9 +110,9 @@ class ClimbSettings(Section):
     steps: int = Field(default=6, ge=2, le=MOST)
     """Points of the first batch."""
     start: FactorValues | None = None
-    """First point; left out: the low end of the line through the centre along the effects."""
+    """First point. Default: the low end of the line through the centre along the effects."""
     step: FactorValues | None = None
-    """Move per step; left out: along the effects, so that ``steps`` points span the stated range."""
+    """Move per step. Default: along the effects, so that ``steps`` points span the stated range."""
     extensions: int = Field(default=1, ge=0, le=MOST)
     """Further batches of up to ``steps`` points when the target was not crossed."""
     reach: float = Field(default=2.0, ge=1.0)
@@ -138,9 +138,9 @@ class SurfaceSettings(Section):
     center_rule: Literal["crossing", "smallest-error"] = "crossing"
     """Centre where the climb crosses the target (interpolated), or at its step nearest to the target."""
     center: FactorValues | None = None
-    """Centre of the design; left out: by ``center_rule``."""
+    """Centre of the design. Default: by ``center_rule``."""
     half_range: FactorValues | None = None
-    """Coded unit of each factor; left out: one climb step, at least ``half_range_least``."""
+    """Coded unit of each factor. Default: one climb step, at least ``half_range_least``."""
     half_range_least: float = Field(default=0.4, gt=0.0)
     """Least half-range as a fraction of the factor's screening half-range (a step along a weak factor is
     too short to fit a slope)."""
@@ -151,7 +151,7 @@ class SurfaceSettings(Section):
     replicates: int = Field(default=1, ge=1, le=MOST)
     """Cases of each factorial and axial run."""
     drop: tuple[str, ...] | None = None
-    """Terms to leave out of the reduced surface ("F^2", "E:F"); left out: backward elimination."""
+    """Terms to leave out of the reduced surface ("F^2", "E:F"). Default: backward elimination."""
     reduce_alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Backward elimination drops a term whose p value is above this."""
     lack_of_fit_alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
@@ -162,7 +162,7 @@ class OptimumSettings(Section):
     """Stage (g): the chosen point and the compatible region."""
 
     point: FactorValues | None = None
-    """The chosen point; left out: the point of the target contour nearest to the centre (coded units), or,
+    """The chosen point. Default: the point of the target contour nearest to the centre (coded units), or,
     without a contour, the compatible point that comes closest to the target."""
     confidence: float = Field(default=0.95, gt=0.0, lt=1.0)
     """Level of the compatible region."""
@@ -176,9 +176,9 @@ class VerificationSettings(Section):
     replicates: int = Field(default=5, ge=2, le=MOST)
     """Fresh cases at the chosen point."""
     margin: Angle | None = Field(default=None, gt=0.0)
-    """Equivalence margin of the leading response, an angle; left out: by ``margin_sds``."""
+    """Equivalence margin of the leading response, an angle. Default: by ``margin_sds``."""
     margin_sds: float = Field(default=2.0, gt=0.0)
-    """Margin in standard deviations of the target; of the leading response when ``margin`` is left out."""
+    """Margin in standard deviations of the target; of the leading response when ``margin`` is omitted."""
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Level of the t-test and of each one-sided test."""
 
@@ -239,7 +239,7 @@ class Target:
     """Responses that the cases must match; the climb follows the first."""
 
     responses: tuple[Response, ...]
-    """The first takes part in the fit; each has its measurements, or none has."""
+    """The first takes part in the fit; all have measurements, or none of them."""
     twin: Twin | None = None
     """Settings that a twin study takes the measurements from; None where they were made."""
 

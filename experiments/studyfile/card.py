@@ -31,12 +31,12 @@ SECTIONS = ("grain", "wall", "contact", "mechanism", "solver")
 def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Lay a study document over the card that it names, relative to a folder, if it names one.
 
-    The laws of the card hold where the study names none.
+    The laws of the card hold where the study does not name any.
 
     Raises
     ------
     StudyError
-        When there is no such card, the file is none, or its values were found with other laws than the
+        When there is no such card, the file is not a card, or its values were found with other laws than the
         study's and the study does not say so.
     """
     own = {key: value for key, value in document.items() if key != MATERIAL}

@@ -22,10 +22,10 @@ class ClusterSection(Section):
     kind: Literal["local", "slurm", "pbs", "lsf", "sge", "oar", "htcondor"] = "local"
     """Place where they run: processes of this machine, or jobs of a scheduler."""
     workers: int | None = Field(default=None, ge=1)
-    """Workers in all, which fill whole jobs, or GPUs of this machine; left out: here all GPUs or one a core,
+    """Workers in all, which fill whole jobs, or GPUs of this machine. Default: here all GPUs or one a core,
     of a scheduler those of a job."""
     gpu: bool | None = None
-    """Each worker has a GPU; left out: on this machine where there is one, in jobs not."""
+    """Each worker has a GPU. Default: on this machine where there is one, in jobs not."""
     workers_per_job: int = Field(default=1, ge=1)
     """Workers of a job."""
     cores: int = Field(default=1, ge=1)
@@ -39,13 +39,13 @@ class ClusterSection(Section):
     account: str | None = None
     """Account that is charged."""
     directives: tuple[str, ...] = ()
-    """Further options of the scheduler, a line of the job's head each, as "--constraint=h200"."""
+    """Further options of the scheduler, a line of the job's head each, e.g. "--constraint=h200"."""
     prologue: tuple[str, ...] = ()
-    """Shell commands of a job before its worker starts, as "module load cuda"."""
+    """Shell commands of a job before its worker starts, e.g. "module load cuda"."""
     python: str | None = None
-    """Python that has dem-warp on the nodes; left out: the one that runs this."""
+    """Python that has dem-warp on the nodes. Default: the one that runs this."""
     interface: str | None = None
-    """Network interface that nodes reach each other by, as "ib0"."""
+    """Network interface that nodes reach each other by, e.g. "ib0"."""
     shared: str = "~/.dem-warp"
     """Folder that all nodes see, for what jobs print and for the certificates of this run's connections."""
 
@@ -65,7 +65,7 @@ class ClusterSection(Section):
 
 
 class Profile(Section):
-    """A file with a ``[cluster]`` and nothing beside."""
+    """A file with a ``[cluster]`` and nothing else."""
 
     cluster: ClusterSection
     """The cluster."""

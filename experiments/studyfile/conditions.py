@@ -36,7 +36,7 @@ class Condition(Section):
     scene: dict[str, Any] | None = None
     """Values of the test that differ."""
     mechanism: dict[str, Any] | None = None
-    """Values of a physical effect beside those of the base law."""
+    """Values of a physical effect in addition to the base law."""
 
     _name: str = PrivateAttr(default="base")
 
@@ -47,12 +47,12 @@ class Condition(Section):
 
     @property
     def changes(self) -> dict[str, Any]:
-        """Sections of the study that differ under it, as written; none: the study as it is."""
+        """Sections of the study that differ under it, as written; empty for the study as it is."""
         return self.model_dump(exclude={"held_out", "camera"}, exclude_none=True)
 
 
 BASE = Condition()
-"""The one condition of a study that has none of its own."""
+"""Condition of a study without conditions."""
 
 
 def _named(conditions: dict[str, Condition]) -> dict[str, Condition]:

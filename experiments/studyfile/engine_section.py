@@ -23,11 +23,11 @@ class EngineSection(Section):
     version: str = ""
     """Version of the program, in any words: results of another one are stored apart."""
     observables: tuple[str, ...] = ()
-    """Observables of the test that the program tells beside the heap; a search needs to know them before."""
+    """Observables of the test that the program reports with the heap; a search needs to know them before."""
     workers: int | None = Field(default=None, ge=1)
-    """Cases at once; left out: one a core."""
+    """Cases at once. Default: one a core."""
     time_limit: Time | None = Field(default=None, gt=0.0)
-    """Wall time of one case, after which it has failed; left out: none."""
+    """Wall time of one case, after which it has failed. Default: no limit."""
 
     @field_validator("command")
     @classmethod

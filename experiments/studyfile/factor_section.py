@@ -85,7 +85,7 @@ class FactorSection(Section):
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Hard physical limits in the natural unit, infinite where there is none."""
+        """Hard physical limits in the natural unit, infinite where it has no bound."""
         least, most = zip(*(setter.limits for setter in self.setters), strict=True)
         size = self.dimension.size(self.unit)
         return max(least) / size, min(most) / size
@@ -189,7 +189,7 @@ def with_factor_values(
 
 
 def check_one_home(document: Mapping[str, Any], sections: Iterable[FactorSection], places: Places) -> None:
-    """Refuse a factor whose parameter has a fixed value beside it: nobody could say which one holds.
+    """Refuse a factor whose parameter also has a fixed value.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Sections generated from the engine's own dataclasses: keys, units, bounds and defaults are theirs.
 
 A section holds what the engine takes, SI. An angle that the engine has in radians is written, and its bounds
-are told, in degrees: `_number` is the one place that turns it.
+are shown, in degrees: `_number` alone converts it.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class LibrarySection(Section):
 
 @cache
 def section_for(engine: type, base: type[EngineSection] = EngineSection) -> type[EngineSection]:
-    """Generate the section of an engine's dataclass; what another section describes is left out."""
+    """Generate the section of an engine's dataclass; without what another section describes."""
     hints, parameters = get_type_hints(engine, include_extras=True), parameters_of(engine)
     keys: dict[str, Any] = {}
     for each in fields(engine):
@@ -90,8 +90,8 @@ def _number(kind: Any, parameter: Parameter, plain: bool) -> Any:
     number, *optional = get_args(bare) or (bare,)
     turned = parameter.unit == "rad"
     limits = ((Gt, parameter.above), (Ge, parameter.at_least), (Lt, parameter.below), (Le, parameter.at_most))
-    told = [(mark, limit) for mark, limit in limits if limit is not None]
-    marks: list[Any] = [mark(math.degrees(limit) if turned else limit) for mark, limit in told]
+    given = [(mark, limit) for mark, limit in limits if limit is not None]
+    marks: list[Any] = [mark(math.degrees(limit) if turned else limit) for mark, limit in given]
     if number is float:
         unit = parameter.unit if plain and parameter.unit != "1" else ""
         marks.insert(0, Dimension(dimension_of_unit(parameter.unit), unit))

@@ -1,4 +1,4 @@
-"""``[mechanism.NAME]`` sections: physical effects of contacts beside those of the base law."""
+"""``[mechanism.NAME]`` sections: physical effects of contacts in addition to the base law."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The registry of observables: numbers that a test yields, and how a picture or a simulated state gives them.
 
 One angle is never enough: retuned friction imitates almost anything in it. To add an observable of the lifted
-cylinder, add its entry to `OBSERVABLES`; any other number that a scene tells of belongs to it by that alone.
+cylinder, add its entry to `OBSERVABLES`; another number that a scene declares needs no entry.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from dem_warp import LiftedCylinder
 from dem_warp.scenes.drum_surface import STATIONS
-from dem_warp.scenes.scene import Observable as Told
+from dem_warp.scenes.scene import Observable as Declared
 
 if TYPE_CHECKING:
     from imaging import HeapAngle, HeapShape, ReposeAngle
@@ -37,7 +37,7 @@ class Instrument(StrEnum):
     PHOTOGRAPH = "photograph"
     """One picture of the heap from the side, with a scale."""
     BALANCE = "balance"
-    """A balance that the tube hangs on, or under what lies on a part of the plate."""
+    """A balance that the tube hangs on, or under a part of the plate."""
     RULER = "ruler"
     """A ruler along the tube."""
     FILM = "film"
@@ -88,7 +88,7 @@ class Observable:
     directed: bool = False
     """Counts along x of the study: several views then show a part of it each."""
     stands_in: str = ""
-    """Observable of the scene that stands for it where the scene does not give it."""
+    """Observable of the scene that replaces it where the scene does not give it."""
     limits: tuple[float, float] | None = None
     """Ends of a ratio, by its definition; those of other units follow from the size of the test."""
     never_above: str = ""
@@ -130,8 +130,8 @@ class Observable:
 _photographed = partial(Observable, instrument=Instrument.PHOTOGRAPH)
 
 
-def _told(name: str, title: str, instrument: Instrument, rule: str = "", **facts: object) -> Observable:
-    """Build an observable that the lifted cylinder tells of, with the scene's unit and definition."""
+def _declared(name: str, title: str, instrument: Instrument, rule: str = "", **facts: object) -> Observable:
+    """Build an observable that the lifted cylinder declares, with the scene's unit and definition."""
     unit, meaning = LiftedCylinder.observables[name]
     return Observable(name, title, unit, meaning + rule, instrument, **facts)  # type: ignore[arg-type]
 
@@ -186,10 +186,10 @@ OBSERVABLES = (
         directed=True,
         limits=(-1.0, 1.0),
     ),
-    _told("rolled_fraction", "grains that rolled off", Instrument.BALANCE, limits=(0.0, 1.0)),
-    _told("fill_height", "height of the filling", Instrument.RULER),
-    _told("wall_drag", "weight on the tube", Instrument.BALANCE, limits=(-1.0, 1.0)),
-    _told(
+    _declared("rolled_fraction", "grains that rolled off", Instrument.BALANCE, limits=(0.0, 1.0)),
+    _declared("fill_height", "height of the filling", Instrument.RULER),
+    _declared("wall_drag", "weight on the tube", Instrument.BALANCE, limits=(-1.0, 1.0)),
+    _declared(
         "t75",
         "time to three quarters",
         Instrument.FILM,
@@ -197,8 +197,8 @@ OBSERVABLES = (
         stands_in="time_to_rest",
         never_above="t55",
     ),
-    _told("t55", "time to 55 %", Instrument.FILM, _UNTIL_REST, stands_in="time_to_rest"),
-    _told("centre_height", "height of the centre of mass", Instrument.SCAN, never_above="height"),
+    _declared("t55", "time to 55 %", Instrument.FILM, _UNTIL_REST, stands_in="time_to_rest"),
+    _declared("centre_height", "height of the centre of mass", Instrument.SCAN, never_above="height"),
 )
 """Observables of the lifted cylinder that a laboratory can measure, in the order of every table."""
 
@@ -239,7 +239,7 @@ PROFILES = {SURFACE_PROFILE: SURFACE, OUTLINE_PROFILE: tuple(each.name for each 
 """Heights of each profile that responses and files may ask for, by its name."""
 
 OF_THE_RUN = ("grain_count", "simulated_time", "grains_lost", "clogged")
-"""Observables of a test that tell of its simulation, and of no measurement."""
+"""Observables about the simulation of a test, which nobody measures."""
 
 _INSTRUMENTS = {
     "deg": Instrument.PHOTOGRAPH,
@@ -255,22 +255,22 @@ VERSION = 2
 """Of the definitions; values measured by other ones are measured again."""
 
 
-def observables_of(told: Mapping[str, Told], leaves_a_heap: bool) -> dict[str, Observable]:
-    """Collect what a scene tells of, and what pictures of its heap show, by columns in a table of cases."""
+def observables_of(declared: Mapping[str, Declared], leaves_a_heap: bool) -> dict[str, Observable]:
+    """Collect what a scene declares and what pictures of its heap show, by columns in a table of cases."""
     heap = {each.column: each for each in (*OBSERVABLES, *OUTLINE)} if leaves_a_heap else {}
     return heap | {
         name: Observable(name, name.replace("_", " "), unit, meaning)
-        for name, (unit, meaning) in told.items()
+        for name, (unit, meaning) in declared.items()
         if name not in heap
     }
 
 
 def measurable(
-    told: Mapping[str, Told], leaves_a_heap: bool, outline: bool = False
+    declared: Mapping[str, Declared], leaves_a_heap: bool, outline: bool = False
 ) -> tuple[Observable, ...]:
     """List what a laboratory can measure of a test, in the order of every table; outlines where asked for.
 
-    Of a test that leaves no heap it is all that the scene tells of, but for what is about the simulation, and
+    Of a test that leaves no heap it is all that the scene declares, except what is about the simulation, and
     for the error, the spread or a side of another observable, whose name begins with that of the other.
     """
     if leaves_a_heap:
@@ -284,6 +284,6 @@ def measurable(
             _INSTRUMENTS[unit],
             part_of=SURFACE_PROFILE if name in SURFACE else "",
         )
-        for name, (unit, meaning) in told.items()
-        if name not in OF_THE_RUN and not any(name.startswith(f"{other}_") for other in told)
+        for name, (unit, meaning) in declared.items()
+        if name not in OF_THE_RUN and not any(name.startswith(f"{other}_") for other in declared)
     )

@@ -49,7 +49,7 @@ class ShapeSection(Section):
     """File with the clump's spheres, relative to the study file: x y z r a line, or a table, text or VTK file
     of LIGGGHTS, Yade, EDEM or DEM-Engine."""
     clump_unit: str | None = None
-    """Unit of that file (mm, m, ...), or the length that is 1 in it; left out: the one it names, or mm."""
+    """Unit of that file (mm, m, ...), or the length that is 1 in it. Default: the one it names, or mm."""
     sphere: Length | None = Field(default=None, gt=0.0)
     """Radius of spherical grains, instead of a clump."""
 
@@ -59,7 +59,7 @@ class ShapeSection(Section):
         if clump is None:
             return None
         path = Path((info.context or {}).get("folder", ".")) / clump
-        if not os.path.isfile(path):  # a name too long is none, and raises nothing
+        if not os.path.isfile(path):  # does not raise for a name that is too long
             raise ValueError(f"no such clump file: {path}")
         return path
 
@@ -89,7 +89,7 @@ class PartSection(ShapeSection):
     """``[grain.shapes.NAME]``: one of several shapes."""
 
     fraction: Number | None = Field(default=None, ge=0.0, le=1.0)
-    """Part of the number of grains that has this shape; left out, which one of them may: the rest."""
+    """Part of the number of grains that has this shape. One of them may omit it and is the rest."""
 
     @model_validator(mode="after")
     def _has_a_shape(self) -> Self:
@@ -211,7 +211,7 @@ class Physics(Section):
     solver: SolverSection = SolverSection()
     """Conventions of the contact law."""
     mechanism: Annotated[MechanismsSection, Generated(mechanisms_section)] = MechanismsSection()
-    """Physical effects beside those of the base contact law."""
+    """Physical effects in addition to the base contact law."""
 
     @model_validator(mode="after")
     def _mechanisms_are_physical(self) -> Self:
@@ -250,7 +250,7 @@ class Physics(Section):
         return narrowness(getattr(scene, "diameter", None), grains.shape, size)
 
     def build_case(self, seed: int) -> Case:
-        """Build one case of the engine; a ValueError tells what it cannot be, `GrainCountError` for one."""
+        """Build one case of the engine; raise ValueError where it cannot be, e.g. `GrainCountError`."""
         case = Case(
             scene=self.scene.scene(self.wall.material()),
             grains=self.grain.population(),

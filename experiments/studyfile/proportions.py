@@ -37,7 +37,9 @@ def narrowness(diameter: float | None, shape: ClumpShape | ShapeMixture, size: f
     if diameter is None:
         return ""
     found = widths(diameter, shape, size)
-    told = f"its diameter of {1e3 * diameter:.4g} mm is {found:.2g} lengths of the longest grain"
+    width = f"its diameter of {1e3 * diameter:.4g} mm is {found:.2g} lengths of the longest grain"
     if found < LEAST_WIDTH:
-        raise ValueError(f"must be at least {LEAST_WIDTH:g} grains wide, better {ADVISED_WIDTH:g}: {told}")
-    return f"the container is narrow, below {ADVISED_WIDTH:g} grains: {told}" if found < ADVISED_WIDTH else ""
+        raise ValueError(f"must be at least {LEAST_WIDTH:g} grains wide, better {ADVISED_WIDTH:g}: {width}")
+    return (
+        f"the container is narrow, below {ADVISED_WIDTH:g} grains: {width}" if found < ADVISED_WIDTH else ""
+    )

@@ -44,7 +44,7 @@ class Row:
     kind: str = ""
     """Units that it may be written in, the base unit first, or the kind of its value."""
     default: str = ""
-    """Value where it is left out, as a file would write it; empty: there is none, or it must be written."""
+    """Default, as a file would write it; empty where there is none or the key is required."""
     bounds: str = ""
     """Rule of its numbers."""
     meaning: str = ""
@@ -56,7 +56,7 @@ class Row:
 def study_reference() -> tuple[Row, ...]:
     """List every section and key of a study file, those of plug-ins included."""
     return (
-        Row("", "material", "text", meaning="Material card whose sections hold where the study has none."),
+        Row("", "material", "text", meaning="Material card whose sections hold where the study lacks them."),
         *_rows(Study, ""),
         Row("[scale.NAME]", "", meaning="Sections that differ at a scale, merged over the rest."),
     )
@@ -87,8 +87,8 @@ def _rows(section: type[BaseModel], path: str, array: bool = False) -> Iterator[
         texts = meanings(section.__bases__[0]) | texts
     for key, name, field, inner in keys:
         if inner is None:
-            told = (_kind(field), _default(field), _rule(field), texts.get(name, ""))
-            yield Row(head, key, *told, required=field.is_required())
+            cells = (_kind(field), _default(field), _rule(field), texts.get(name, ""))
+            yield Row(head, key, *cells, required=field.is_required())
         elif default := _name(field):
             yield Row(head, key, "text", json.dumps(default), "", texts.get(name, ""))
     for key, _, field, inner in keys:

@@ -1,4 +1,4 @@
-"""Names that no factor may have: columns of the tables that factors stand in."""
+"""Names that no factor may have: columns of the tables of factors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LABELS = ("stage", "scene", "run", "replicate", "seed", "step", "piece", "direct
 """Columns that say which case, step or response a row is of."""
 
 RESULTS = ("status", "reason", "angle", "angle_se", "case_key", "rebuilds")
-"""Columns that every table of cases gets, beside the observables of its scene."""
+"""Columns that every table of cases gets, with the observables of its scene."""
 
 STATISTICS = ("predicted", "mean", "sd", "n", "error", "error_percent", "half_width", "span")
 """Columns of paths and directions."""

@@ -152,7 +152,7 @@ def dimension_of(field: FieldInfo) -> Dimension | None:
 
 
 def bounds(field: FieldInfo) -> tuple[float, float]:
-    """Lower and upper bound of a number field in the base unit, infinite where there is none."""
+    """Lower and upper bound of a number field in the base unit, infinite where it has no bound."""
     lower, upper = float("-inf"), float("inf")
     for mark in marks_of(field):
         if isinstance(mark, (Ge, Gt)):
@@ -177,7 +177,7 @@ def section_of(field: FieldInfo) -> type[BaseModel] | None:
 
 
 def marks_of(field: FieldInfo) -> Iterator[Any]:
-    """Marks of a field's type, or of what it holds where it is optional or holds several."""
+    """Yield the marks of a field's type, or of its items where it is optional or holds several."""
     yield from field.metadata
     for kind in get_args(field.annotation):
         yield from getattr(kind, "__metadata__", ())
@@ -215,7 +215,7 @@ def nested_error(errors: Any) -> PydanticCustomError:
 
 
 def message(details: Mapping[str, Any]) -> str:
-    """Rule that an error of pydantic tells of, in the words of a study's errors."""
+    """Return the rule of a pydantic error, in the words of a study's errors."""
     return details["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
 
 

@@ -38,7 +38,7 @@ class Setter:
     dimension: Dimension
     """Dimension of its quantity."""
     limits: tuple[float, float]
-    """Lower and upper bound in the base unit, infinite where there is none."""
+    """Lower and upper bound in the base unit, infinite where it has no bound."""
     number: TypeAdapter[Any]
     """Reads a quantity as the field does: in SI, within its bounds."""
 
@@ -77,12 +77,12 @@ def setter_at(parameter: str) -> Setter:
 def _compiled(parameter: str, *libraries: type[Section]) -> Setter:
     path = tuple(parameter.split("."))
     # laws are choices, which no factor varies; a set is named as a whole
-    trail = steps(Physics, path) if path[0] != "solver" else []
-    field = trail[-1][1] if trail else None
+    found = steps(Physics, path) if path[0] != "solver" else []
+    field = found[-1][1] if found else None
     dimension = dimension_of(field) if field else None
     if field is None or dimension is None:
         raise ValueError('must lead to a quantity of the study, e.g. "contact.grain-grain.static_friction"')
-    return Setter(path, tuple(name for name, _ in trail), dimension, bounds(field), _reader(field))
+    return Setter(path, tuple(name for name, _ in found), dimension, bounds(field), _reader(field))
 
 
 def _reader(field: FieldInfo) -> TypeAdapter[Any]:

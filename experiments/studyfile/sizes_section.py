@@ -41,7 +41,7 @@ class SizesSection(Section):
     counts: Path | None = None
     """File of an image analyser, a CSV relative to the study: a diameter a grain, or from, to and count."""
     unit: str | None = None
-    """Unit of the diameters of the file that have none beside them, as um."""
+    """Unit of the diameters of the file that have no unit, e.g. um."""
     distribution: Literal["normal", "lognormal", "rosin-rammler"] | None = None
     """Distribution instead of a file."""
     mean: Length | None = Field(default=None, gt=0.0)
@@ -57,15 +57,15 @@ class SizesSection(Section):
     spread: Number | None = Field(default=None, gt=0.0)
     """Exponent of a Rosin-Rammler distribution: the larger, the narrower."""
     by: Literal["number", "volume", "mass"] | None = None
-    """Quantity that the shares are of; left out: mass of a sieve analysis, number of counts."""
+    """Quantity that the shares are of. Default: mass of a sieve analysis, number of counts."""
     diameter: Literal["sieve", "feret", "volume"] | None = None
     """Diameter that was measured: the side of the square opening that a grain just passes, its largest extent
-    (Feret), or that of a sphere of its volume; left out: sieve of a sieve analysis, any of spheres."""
+    (Feret), or that of a sphere of its volume. Default: sieve of a sieve analysis, any of spheres."""
     cut: tuple[Annotated[float, Field(ge=0.0, lt=1.0)], Annotated[float, Field(gt=0.0, le=1.0)]] = (
         0.01,
         0.99,
     )
-    """Quantiles between which the grains are simulated; the report says how much mass lies beyond them."""
+    """Quantiles between which the grains are simulated; the report says how much mass is beyond them."""
     classes: int = Field(default=10, ge=1, le=50)
     """Classes of equal shares between the cuts, each of the size of its mean mass."""
 
@@ -75,7 +75,7 @@ class SizesSection(Section):
         if file is None:
             return None
         path = Path((info.context or {}).get("folder", ".")) / file
-        if not os.path.isfile(path):  # a name too long is none, and raises nothing
+        if not os.path.isfile(path):  # does not raise for a name that is too long
             raise ValueError(f"no such file: {path}")
         return path
 
@@ -129,7 +129,7 @@ class SizesSection(Section):
         return GrainPopulation.of_classes(scaled, material, SizeClasses(sizes, classes.fractions))
 
     def check_shape(self, shape: ClumpShape) -> None:
-        """Raise a ValueError where the diameter is not told, and the shape has several."""
+        """Raise a ValueError where the kind of diameter is not given, and the shape has several."""
         self._diameter_of(shape)
 
     def _diameter_of(self, shape: ClumpShape) -> float:
@@ -148,7 +148,7 @@ def _classes(section: SizesSection, modified: tuple[int, ...]) -> Classes:
 
 
 def _distribution(section: SizesSection) -> tuple[Distribution, float]:
-    """Distribution of the diameter, and the part of the mass that a table gives none for."""
+    """Distribution of the diameter, and the share of the mass without a diameter in the table."""
     # The formulas of scipy.stats take a second to load, and few studies need them; the readers of tables know
     # the units of this package.
     from scipy import stats

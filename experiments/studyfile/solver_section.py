@@ -32,7 +32,7 @@ class LawsSection(EngineSection):
     """``[solver.laws]``: a set of laws, changed law by law."""
 
     base: str = UNNAMED
-    """Name of the set that holds for what is left out."""
+    """Name of the set that holds for the other keys."""
 
     @model_validator(mode="after")
     def _can_be(self) -> Self:
@@ -84,13 +84,13 @@ class SolverSection(Section):
     """``[solver]``: the conventions that the coefficients hold for."""
 
     laws: Annotated[Any, _Laws(laws_section, UNNAMED)] = EDEM
-    """Set of laws by the name of its code, or a table law by law; left out, the base law, ``"edem"``."""
+    """Set of laws by the name of its code, or a table law by law. Default: the base law, ``"edem"``."""
     card_laws: str | None = Field(default=None)
-    """Laws of the material card, where it was found with others than the study's: told, and taken."""
+    """Laws of the material card, where it was found with others than the study's; the report says so."""
     corrected_for: str | None = Field(default=None)
     """Solver that a bridge has corrected the values for; a study takes it from its material card."""
     card_solver: str | None = Field(default=None)
-    """That solver, where the study runs in another one: told, and the values taken as they are."""
+    """That solver, where the study runs in another one; its values are taken as they are."""
 
     def check_solver(self, name: str, place: str) -> None:
         """Check that values corrected for one solver run in it, or that the study says which one it was.

@@ -52,8 +52,8 @@ class MeasurementSection(Section):
     """True: the heights of the outline are observables too, ``outline_1`` to ``outline_8``."""
 
     @property
-    def told(self) -> dict[str, Any]:
-        """Settings by name, for keys and cards; outlines are left out where nobody asks for them."""
+    def settings(self) -> dict[str, Any]:
+        """Settings by name, for keys and cards; without ``outline`` where it is off."""
         return self.model_dump(exclude=None if self.outline else {"outline"})
 
     @field_validator("fit")
@@ -65,12 +65,12 @@ class MeasurementSection(Section):
 
 
 class DiscoverSection(Section):
-    """``[discover]``: the search for a missing effect; every part may be left out."""
+    """``[discover]``: the search for a missing effect; every part is optional."""
 
     mechanisms: tuple[str, ...] | None = Field(default=None, min_length=1)
-    """Names of the effects that are looked for; left out: all of the library that the study can have."""
+    """Names of the effects that are looked for. Default: all of the library that the study can have."""
     maxima: dict[str, RawQuantity] = Field(default={})
-    """Largest sizes that are searched, by the effect's name; left out: the library's."""
+    """Largest sizes that are searched, by the effect's name. Default: the library's."""
     settings: dict[str, int | float] = Field(default={})
     """Numbers of runs and levels that differ from the defaults, by name."""
 
@@ -101,9 +101,9 @@ class Study(Physics):
     discover: DiscoverSection = DiscoverSection()
     """The search for a missing effect."""
     engine: EngineSection | None = None
-    """The program that simulates the cases; left out: dem-warp itself."""
+    """The program that simulates the cases. Default: dem-warp itself."""
     cluster: ClusterSection | None = None
-    """The workers that simulate the cases; left out: this machine's own."""
+    """The workers that simulate the cases. Default: this machine's own."""
 
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
     _places: Places = PrivateAttr(default_factory=lambda: Places(Path(), {}))
@@ -168,12 +168,12 @@ class Study(Physics):
 
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Hard physical limits of every factor in its natural unit, infinite where there is none."""
+        """Hard physical limits of every factor in its natural unit, infinite where it has no bound."""
         return {section.name: section.limits for section in self.factor_sections}
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
-        """Conditions of the tests, in the order of the file; none written: the test as it is."""
+        """Conditions of the tests, in the order of the file. Default: the test as it is."""
         return tuple(self.condition_sections.values()) or (BASE,)
 
     def under(self, condition: str) -> Study:
@@ -255,7 +255,7 @@ class Study(Physics):
         tables
             The ``[[factor]]`` sections; a level is a number, a text or a quantity.
         settings
-            Values by place, which hold where the study has none.
+            Values by place, for places without a value in the study.
         solver
             Conventions of the contact law in place of the study's.
 
@@ -283,12 +283,12 @@ class Study(Physics):
         sections = validated(FactorTable, {"factor": rows}, self._places).factor
         added, document = sections[len(self.factor_sections) :], self.document
         change: dict[str, Any] = {}
-        for path, value in ((path, section.middle) for section in added for path in section.paths):
+        for path, middle in ((path, section.middle) for section in added for path in section.paths):
             drop(document, path)
-            change = merge(change, nested(path, value))
-        for path, value in ((place.split("."), value) for place, value in settings.items()):
-            if value_at(document, path) is None:
-                document, change = (merge(each, nested(path, value)) for each in (document, change))
+            change = merge(change, nested(path, middle))
+        for keys, value in ((place.split("."), value) for place, value in settings.items()):
+            if value_at(document, keys) is None:
+                document, change = (merge(each, nested(keys, value)) for each in (document, change))
         document["factor"] = [*document.get("factor", []), *(section.table for section in added)]
         try:
             physics = revised(self._physics.model_copy(update={"solver": solver}), change)

@@ -20,7 +20,7 @@ from experiments.studyfile.schema import Angle, RawQuantity, Section
 from imaging import View
 
 MEASUREMENTS = ("mean", "sd", "n")
-"""Keys that tell of the physical test."""
+"""Keys about the physical test."""
 
 SOURCES = ("pictures", "file", "profiles")
 """Keys of ``[target]`` that name where the measurements are taken from."""
@@ -67,10 +67,10 @@ class TwinSection(Section):
 
 
 class ResponseSection(Section):
-    """``[[response]]``: a number to be matched, beside the ``[target]`` or instead of it."""
+    """``[[response]]``: a number to be matched, with the ``[target]`` or instead of it."""
 
     observable: str
-    """Observable of the scene, as ``"solid_fraction"``; ``"angle"`` of a scene that leaves a heap; with
+    """Observable of the scene, e.g. ``"solid_fraction"``; ``"angle"`` of a scene that leaves a heap; with
     profiles ``"surface"`` of a drum, ``"outline"`` of a heap."""
     weights: dict[str, float] | None = Field(default=None, min_length=1)
     """Observables of one unit that the response is the weighted sum of; observable is then its name."""
@@ -81,9 +81,9 @@ class ResponseSection(Section):
     measurements: tuple[float, ...] = ()
     """Single measurements of a direction of a profile, in SI; written by the program."""
     name: str | None = Field(default=None, pattern=r"^[A-Za-z_]\w*$")
-    """Name in tables; left out: as the observable."""
+    """Name in tables. Default: as the observable."""
     scene: str = TARGET_SCENE
-    """Name of the ``[response-scene.NAME]`` or ``[condition.NAME]`` that measures it; left out: the study's
+    """Name of the ``[response-scene.NAME]`` or ``[condition.NAME]`` that measures it. Default: the study's
     own scene."""
     mean: RawQuantity | None = None
     """Mean of the measurements."""
@@ -137,7 +137,7 @@ class ResponseSection(Section):
         )
 
     def _value(self, name: str, unit: str, path: KeyPath, places: Places) -> float:
-        """Convert a measurement; NaN where it was left out."""
+        """Convert a measurement; NaN where it is missing."""
         quantity = getattr(self, name)
         if quantity is None:
             return float("nan")
@@ -162,7 +162,7 @@ class TargetSection(ResponseSection):
     observable: str = ANGLE
     """Observable of the scene."""
     fit: str | None = None
-    """Part of the flank that the measured angles were fitted to; left out: as ``[measurement]`` says."""
+    """Part of the flank that the measured angles were fitted to. Default: as ``[measurement]`` says."""
     pictures: str | None = None
     """Photographs of the heaps, instead of numbers: a folder, or a pattern as ``"photos/*.jpg"``."""
     by: Grouping = "picture"
@@ -172,7 +172,7 @@ class TargetSection(ResponseSection):
     view: ViewSection | None = None
     """Known facts of the photographs."""
     file: str | None = None
-    """File of measured heaps, instead of numbers: all that it tells is to be matched, the observable first
+    """File of measured heaps, instead of numbers: all that it holds is to be matched, the observable first
     that is named here."""
     note: str = ""
     """Source of the measurements, in words."""
@@ -180,7 +180,7 @@ class TargetSection(ResponseSection):
     """The target comes from cases simulated with settings that the campaign does not see."""
 
     def lacks_a_heap(self, scenes: Mapping[str, SceneSection]) -> bool:
-        """Tell if it is the angle of a heap, without a word, of a test that leaves none."""
+        """Return whether it is by default the angle of a heap, and its test leaves no heap."""
         scene = scenes.get(self.scene)
         return "observable" not in self.model_fields_set and scene is not None and not scene.leaves_a_heap
 

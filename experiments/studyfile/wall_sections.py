@@ -39,7 +39,7 @@ class InteractionSection(Section):
 
 
 class WallPartSection(Section):
-    """``[walls.NAME]``: walls of another material; what is left out is as of the other walls."""
+    """``[walls.NAME]``: walls of another material; what it omits is that of the other walls."""
 
     density: Density | None = Field(default=None, gt=0.0)
     """Mass of the solid per volume."""

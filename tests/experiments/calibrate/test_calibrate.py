@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -38,6 +39,7 @@ def hidden(**truth: float) -> Target:
 
 @dataclass(frozen=True)
 class AnalyticStudy:
+    file: Path = Path("study.toml")
     target: Target = field(default_factory=lambda: measured(26.0, 0.4))
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = FACTORS
