@@ -1,4 +1,4 @@
-"""A heap to be turned in the page: its spheres, packed, and the picture that stands for it on paper."""
+"""Heap in three dimensions: its packed spheres, and a picture for paper."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ def screening_design_table(result: ScreeningResult, responses: Sequence[Response
     values = {name: found.measured for name, found in result.responses.items()}
     frame, measured = _with_responses(result.design.coded, values, responses)
     coded = [Column(name, name, "coded") for name in result.design.coded.columns]
-    note = f"Dummy columns, which stand for no factor: {', '.join(result.design.dummies) or 'none'}."
+    note = f"Dummy columns, which belong to no factor: {', '.join(result.design.dummies) or 'none'}."
     caption = "Screening design (coded) and responses."
     return make_table("screening-design", frame, ["run", *coded, *measured], caption, note)
 

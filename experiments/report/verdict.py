@@ -1,4 +1,4 @@
-"""The verdict of a campaign in words; the numbers behind it stand once, below it."""
+"""Verdict of a campaign in words; its numbers are elsewhere on the page."""
 
 from __future__ import annotations
 

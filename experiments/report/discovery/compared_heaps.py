@@ -95,7 +95,7 @@ def _size(angle: ReposeAngle) -> tuple[float, float]:
 def _shown(image: np.ndarray, angle: ReposeAngle, window: _Window, beyond: bool = False) -> np.ndarray:
     """Cut a window of pixels about the heap out of a picture, and draw the fitted flanks on it.
 
-    What lies beyond the picture is left out, or made of its border.
+    What is beyond the picture is left out, or made of its border.
     """
     ends = angle.outline.position[[0, -1]]
     columns, rows = angle.outline.plate.picture_point(ends, np.zeros(2))

@@ -18,7 +18,7 @@ from experiments.studyfile import Study
 
 
 def search_pastes(found: Discovery, study: Study, terms: Terms, provenance: Mapping[str, Any]) -> list[Paste]:
-    """Write paragraph and table in Markdown and in LaTeX; none where nothing could be fitted."""
+    """Write paragraph and table in Markdown and in LaTeX; nothing without a fit."""
     if found.base is None:
         return []
     paragraph = search_paragraph(found, study, terms, provenance)

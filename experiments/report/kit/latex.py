@@ -39,7 +39,7 @@ _SIGN = re.compile("|".join(re.escape(sign) for sign in SIGNS))
 
 
 def latex_text(text: str) -> str:
-    """Write a text so that LaTeX prints it as it stands."""
+    """Write a text so that LaTeX prints it unchanged."""
     return _SIGN.sub(lambda found: SIGNS[found[0]], text)
 
 

@@ -101,7 +101,7 @@ def make_table(
     frame
         One row a row. A named index is a column like any other.
     columns
-        What to show, in order; a column that the frame lacks is left out. A key alone stands for the column
+        What to show, in order; a column that the frame lacks is left out. A key alone means the column
         of `KNOWN`, else for a text below its own name.
     caption, note
         Above and below the table.

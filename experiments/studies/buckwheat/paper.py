@@ -233,7 +233,7 @@ def _climb_step() -> Misprint:
 
 
 def _points_outside() -> Iterator[Misprint]:
-    """Name the runs that lie outside the ranges of Table 2."""
+    """Name the runs outside the ranges of Table 2."""
     climb = published("steepest_climb")[["E", "F"]]
     for place, table in (("Table 5", climb), ("Table 6", surface().design.natural)):
         for factor in (factor for factor in factors() if factor.name in table):
@@ -266,7 +266,7 @@ def _recomputed_tables() -> Iterator[tuple[str, str, pd.DataFrame]]:
 
 
 def _composite_settings() -> pd.DataFrame:
-    """Natural settings of Table 6: its star points stand at the square root of two."""
+    """Calculate the natural settings of Table 6, its star points at the square root of two."""
     coded = published("central_composite")[["E_coded", "F_coded"]]
     coded = coded.mask(coded.abs() == 1.414, np.sign(coded) * math.sqrt(2.0))
     return pd.DataFrame({f.name: f.to_natural(coded[f"{f.name}_coded"]) for f in composite_factors()})
