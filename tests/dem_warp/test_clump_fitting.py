@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from dem_warp.clump_fitting import fit_clump
-from dem_warp.solids import parse_solid, read_mesh
+from dem_warp.solids import MESH_KINDS, parse_solid, read_mesh
 
 # Resolution 40 leaves samples 1/40 of the longest side apart, and a polyhedron of 48 sides to a circle is
 # 0.3 % short of its area: relative volumes of these solids are known to about a percent.
@@ -90,6 +90,25 @@ def test_a_mesh_file_comes_back_in_metres(tmp_path):
     inches = read_mesh(tmp_path / "grain.stl", unit=25.4e-3)
     assert inches.volume == pytest.approx(8.0 * 25.4e-3**3, rel=1e-6)
     assert fit_clump(read, 1).shape.radii[0] == pytest.approx(0.5e-3, rel=0.02)  # a tenth of a sample
+
+
+@pytest.mark.parametrize("kind", MESH_KINDS)
+def test_faces_turned_over_are_turned_back_without_networkx(tmp_path, monkeypatch, kind):
+    """Two bodies, some of their faces turned over; trimesh itself would need networkx."""
+    for module in (trimesh.graph, trimesh.repair):
+        monkeypatch.setattr(module, "nx", None)
+    ball, box = (
+        trimesh.creation.icosphere(subdivisions=2),
+        trimesh.creation.box(bounds=[[3, 0, 0], [4, 1, 1]]),
+    )
+    whole = trimesh.util.concatenate([ball, box])
+    faces = np.array(whole.faces)
+    faces[::3] = faces[::3, ::-1]
+    trimesh.Trimesh(whole.vertices, faces, process=False).export(tmp_path / f"grain.{kind}")
+    read = read_mesh(tmp_path / f"grain.{kind}", unit=1.0)
+    assert read.is_winding_consistent
+    # coordinates of a file have seven digits
+    assert read.volume == pytest.approx(ball.volume + 1.0, rel=1e-6)
 
 
 def test_bad_mesh_files_are_refused(tmp_path):

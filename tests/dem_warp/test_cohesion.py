@@ -329,18 +329,6 @@ def test_jkr_takes_from_an_impact_what_it_costs_to_part():
 # ---- precision, lists, checks --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mechanism", [COHESION, STICKY, WATER], ids=lambda m: m.name)
-def test_the_production_precision_follows_float64(mechanism):
-    # As in any impact, half a count of 6e-11 m is up to 1e-5 of an overlap, and so of the force. Measured:
-    # 6e-10 m and 9e-7 m/s.
-    speeds = np.array([0.01, 0.03])
-    exact, short = (collide(sticking(mechanism), speeds, 200, precision) for precision in ("double", "mixed"))
-    for name, atol in (("positions", 2e-9), ("velocities", 3e-6)):
-        np.testing.assert_allclose(
-            getattr(short, name), getattr(exact, name), rtol=0.0, atol=atol, err_msg=name
-        )
-
-
 DAMP = (
     CapillaryBridge(surface_tension=0.072, bridge_volume=8e-12),
     JKR(work_of_adhesion=0.1),

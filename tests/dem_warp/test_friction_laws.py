@@ -97,16 +97,3 @@ def test_friction_that_weakens_follows_the_closed_form_on_either_side_of_the_cri
     assert abs(seen[-1, 0]) < 5e-5
     assert seen[-1, 1] == pytest.approx(critical, rel=1e-12)
     assert seen[-1, 2] > 1.2 * speeds[2]
-
-
-@pytest.mark.parametrize(
-    ("kind", "values", "message"),
-    [
-        (KineticFriction, {"friction_drop": 1.0}, r"KineticFriction.friction_drop: must be below 1, got 1.0"),
-        (RateWeakening, {"weakening": 1.5}, r"RateWeakening.weakening: must be below 1, got 1.5"),
-        (RateWeakening, {"weakening": 0.5}, r"RateWeakening.weakening_speed: must be above 0 .* got 0.0"),
-    ],
-)
-def test_bad_parameters_are_refused(kind, values, message):
-    with pytest.raises(ValueError, match=message):
-        kind(**values)

@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import GRAIN, GRAVITY, STEEL, assert_measured_as_told, assert_same_result, ball_case, run_batch
+from worlds import GRAIN, GRAVITY, STEEL, assert_measured_as_told, ball_case, run_batch
 
 from dem_warp import Case, CaseResult, Hopper
-from dem_warp.batch import Batch
-from dem_warp.checkpoint import Checkpoints
 from dem_warp.scenes.discharge import DischargeState
 
 BALL_DIAMETER = 4e-3
@@ -94,21 +92,6 @@ def test_nothing_passes_a_hole_smaller_than_a_ball(runs):
     assert (seen["clogged"], seen["fallen_mass"], seen["discharge_time"]) == (1, 0, 0)
     assert seen["mass_left"] == seen["filled_mass"]
     assert len(run.positions) == seen["grain_count"]
-
-
-def test_a_hopper_gives_the_same_bits_alone_and_resumed(runs, tmp_path):
-    case, kept = hopper_case(WIDE), Checkpoints(tmp_path)
-    batch, results = Batch([case], "cpu", kept), []
-    while batch.running:
-        results += batch.advance()
-        if batch.phase(0) == "discharge" and len(batch.controllers[0].state.fallen) == 8:
-            batch.save()
-    assert_same_result(results[0][1], runs[WIDE])
-    resumed, results = Batch([case], "cpu", kept), []
-    assert len(resumed.controllers[0].state.fallen) == 8
-    while resumed.running:
-        results += resumed.advance()
-    assert_same_result(results[0][1], runs[WIDE])
 
 
 def test_the_rate_is_that_of_the_steady_part():

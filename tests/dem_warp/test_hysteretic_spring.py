@@ -101,9 +101,3 @@ def test_a_ball_rests_deeper_in_its_dent():
     # At rest the force is the weight, to rounding.
     assert RADIUS - state(solver)["positions"][0, 2] == pytest.approx(expected, rel=1e-9)
     assert expected < 0.8 * deepest
-
-
-@pytest.mark.parametrize("plasticity", [1.0, -0.1])
-def test_bad_parameters_are_refused(plasticity):
-    with pytest.raises(ValueError, match=rf"HystereticSpring.plasticity: must be .* got {plasticity}"):
-        HystereticSpring(plasticity=plasticity)

@@ -136,15 +136,6 @@ def test_the_chosen_restitution_comes_back():
             assert impact.restitution == pytest.approx(chosen, rel=relative)
 
 
-def test_the_error_of_the_restitution_is_of_first_order():
-    coarse, fine = (
-        np.mean([1.0 - i.restitution / 0.18 for i in of_two_spheres(pair(restitution=0.18), steps, 3.0)])
-        for steps in (100, 800)
-    )
-    # Averaged over the phases; measured: 1.0.
-    assert 0.8 < math.log(coarse / fine) / math.log(8.0) < 1.2
-
-
 @pytest.mark.parametrize(("chosen", "comes"), [(0.1, 0.253), (0.18, 0.311), (0.5, 0.550), (0.9, 0.902)])
 def test_damping_that_may_not_attract_returns_a_higher_restitution(chosen, comes):
     # The oscillator leaves when its force, not its overlap, is zero: exp(-2 theta cot theta) with cos theta =

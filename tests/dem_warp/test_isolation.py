@@ -56,10 +56,6 @@ def alone():
     return state(solver)
 
 
-def test_the_same_world_twice_gives_the_same_bits(alone):
-    assert_same_bits(state(run(heap(1))), alone)
-
-
 def test_other_worlds_of_a_batch_change_nothing(alone):
     others = [heap(2, count=31), heap(3, count=7, fraction=0.6), heap(4, friction=0.0)]
     for place in (0, 1, 3):
@@ -93,16 +89,6 @@ def test_an_overflowing_world_is_flagged_and_changes_nothing(alone):
     assert WorldFlag.NEIGHBOUR_OVERFLOW in WorldFlag(int(solver.flags.numpy()[0]))
     assert solver.flags.numpy()[1] == 0
     assert_same_bits(state(solver, 1), alone)
-
-
-def test_a_world_overflows_in_any_company_or_in_none():
-    # Forty balls in one place, more than any packing has; a world of a wide skin has longer lists.
-    places = np.random.default_rng(0).normal(size=(40, 3)) * 1e-3
-    crowd, roomy = replace(heap(0), grains=grains(places)), replace(heap(1), skin=2.0 * RADIUS)
-    alone, together = solve(crowd, precision="mixed"), solve(roomy, crowd, precision="mixed")
-    assert together.neighbours.capacity > alone.neighbours.capacity
-    assert WorldFlag.NEIGHBOUR_OVERFLOW in WorldFlag(int(alone.flags.numpy()[0]))
-    assert together.flags.numpy().tolist() == [0, *alone.flags.numpy()]
 
 
 def test_stopping_a_world_freezes_it_and_changes_no_other(alone):

@@ -122,16 +122,6 @@ def test_processes_and_callbacks_change_nothing(heap):
     assert not np.array_equal(results[1].sizes[:5], results[0].sizes[:5])
 
 
-def test_a_case_in_a_batch_gives_the_same_bits(heap):
-    others = [
-        small_case(seed=3, scene=replace(SMALL_TUBE, grain_count=20)),
-        small_case(seed=4, modulus_scale=30.0, scene=replace(SMALL_TUBE, grain_count=10)),
-    ]
-    results = run_batch([others[0], small_case(), others[1]])
-    assert_same_result(results[1], heap)
-    assert {result.status for result in results.values()} == {"finished"}
-
-
 def test_a_second_shape_of_fraction_0_changes_no_bit(heap):
     # The other shape has more spheres, whose kernels differ.
     other = ClumpShape.from_spheres(1e-3 * np.arange(36).reshape(12, 3), np.full(12, 1e-3))
@@ -185,12 +175,6 @@ def test_grains_of_5_and_of_30_spheres_form_a_heap():
     assert result.status == "finished"
     assert len(result.sphere_radii) == 5 * (result.shapes == 0).sum() + 30 * (result.shapes == 1).sum()
     assert (result.sphere_centers[:, 2] > 0.9 * result.sphere_radii).all()
-
-
-def test_the_skin_of_a_case_does_not_change_its_bits(heap):
-    wide = simulate([small_case(skin=1.6e-3)], device="cpu", workers=1)[0]
-    assert_same_result(wide, heap)
-    assert wide.observables["rebuilds"] != heap.observables["rebuilds"]
 
 
 def test_a_diverging_case_is_a_row_with_its_reason(heap):

@@ -47,14 +47,6 @@ def test_a_grain_on_a_tilted_plate_stays_below_the_friction_angle_and_leaves_abo
     assert run(tilt=ABOVE).observables["grains_lost"] == 1
 
 
-def test_a_rough_plate_holds_the_grain_that_slid():
-    rough = run(tilt=ABOVE, plate_friction=SLIPPERY + 0.6)
-    assert rough.observables["grains_lost"] == 0
-    # The same friction as an excess; and a known friction has no excess.
-    assert_same_result(run(tilt=ABOVE, plate_friction_excess=0.6), rough)
-    assert_same_result(run(tilt=ABOVE, plate_friction=SLIPPERY + 0.6, plate_friction_excess=0.3), rough)
-
-
 def test_the_friction_of_the_plate_is_the_plates_alone():
     def contacts(**options: float) -> dict[str, object]:
         case = small_case(scene=replace(SMALL_TUBE, **options))

@@ -7,7 +7,6 @@ import pytest
 from worlds import (
     RADIUS,
     Impact,
-    assert_same_bits,
     ball_mass,
     grains,
     oblique_impact,
@@ -15,7 +14,6 @@ from worlds import (
     pile,
     record,
     solve,
-    state,
     world,
 )
 
@@ -23,13 +21,11 @@ from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.contact_law import contact_law
 from dem_warp.laws.hysteretic_spring import HystereticSpring
 from dem_warp.laws.jkr import JKR
-from dem_warp.laws.library import MECHANISMS, parameters
+from dem_warp.laws.library import parameters
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.model import WorldSetup
 from dem_warp.walls import Plane
-
-KINDS = list(MECHANISMS.values())
 
 
 def with_mechanism(setup: WorldSetup, *mechanisms: Mechanism) -> WorldSetup:
@@ -44,20 +40,6 @@ def with_mechanism(setup: WorldSetup, *mechanisms: Mechanism) -> WorldSetup:
         gravity=setup.gravity,
         skin=setup.skin,
     )
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_a_null_mechanism_leaves_the_base_law(kind: type[Mechanism]):
-    """To rounding, in another compiled kernel; in the same one, whatever its other parameters, to the bit."""
-    others = {name: 0.5 for name in kind.parameter_names() if name != kind.strength}
-    null, other_null = (with_mechanism(oblique_impact(), kind(**values)) for values in ({}, others))
-    base, first, second = solve(oblique_impact()), solve(null), solve(other_null)
-    for solver in (base, first, second):
-        solver.advance(2)
-    assert_same_bits(state(first), state(second))
-    for name, expected in state(base).items():
-        # An impact of 100 steps, each rounded in float64.
-        np.testing.assert_allclose(state(first)[name], expected, rtol=1e-12, atol=1e-15, err_msg=name)
 
 
 def test_parameters_of_mechanisms_have_names_of_their_own():

@@ -63,7 +63,7 @@ FALL = 0.1
 """The time in which a pile falls and takes in most of its impacts [s]."""
 
 
-@pytest.fixture(scope="module", params=["mixed", "double"])
+@pytest.fixture(scope="module", params=["mixed"])
 def settled(request):
     """Precision, state in the midst of settling, and state at the end."""
     solver = solve(rich_pile(), precision=request.param)

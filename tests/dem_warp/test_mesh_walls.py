@@ -153,26 +153,6 @@ def test_a_plate_of_triangles_is_a_plane(mesh, place, velocity):
         np.testing.assert_allclose(ends[1][name], ends[0][name], rtol=0.0, atol=1e-9 * size, err_msg=name)
 
 
-def test_a_moving_plate_of_triangles_is_a_moving_plane():
-    motion = Motion(
-        velocity=(0.05, 0.0, 0.1), spin=(0.4, 1.0, -2.0), amplitude=(0.0, 1e-3, 1e-4), frequency=30.0
-    )
-    contact = pair(restitution=0.4, friction=0.3, rolling=0.01)
-    ends = []
-    for wall in (Plane(), plate(9, shift=0.3)):
-        ball = grains([0.01, 0.02, RADIUS])
-        solver = solve(world(ball, contact, TIME_STEP, walls=(wall,), gravity=downhill(0.0)))
-        for motion_now, chunks in ((motion, 6), (Motion(spin=(0.0, -3.0, 0.0)), 3)):
-            solver.move_wall(0, 0, motion_now)
-            solver.advance(chunks)
-        ends.append(state(solver))
-        poses = solver.wall_pose(0, 0)
-    assert poses[1][3] < 0.999
-    assert np.abs(ends[0]["spins"]).max() > 3.0
-    for name, size in (("positions", 0.1), ("velocities", 1.0), ("spins", 100.0)):
-        np.testing.assert_allclose(ends[1][name], ends[0][name], rtol=0.0, atol=1e-9 * size, err_msg=name)
-
-
 def test_a_ball_keeps_its_energy_between_walls_of_triangles():
     # Frictionless and elastic, around a box within a tube of eleven flat sides.
     velocity = np.array([0.1, 0.9, 0.04])
@@ -251,16 +231,6 @@ def test_a_world_goes_on_in_another_batch_with_its_moving_mesh():
         solver.move_wall(w, 0, Motion((0.0, 0.0, -0.01)))
         run_for(solver, 0.02)
     assert_same_bits(state(second, 1), state(whole))
-
-
-def test_the_skin_does_not_change_the_motion_on_a_mesh():
-    ends = []
-    for skin in (2e-4, 4e-3):
-        solver = solve(replace(heap_in(Mesh.tube(0.0245, 0.06, 12), 1), skin=skin))
-        run_for(solver, 0.1)
-        assert solver.flags.numpy()[0] == 0
-        ends.append(state(solver))
-    assert_same_bits(*ends)
 
 
 def test_worlds_with_and_without_meshes_run_apart():

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from worlds import (
-    BOOT,
     PILE_STEP,
     PILE_TUBE,
     PYRAMID,
@@ -112,21 +111,6 @@ def test_a_moved_pile_has_the_lists_of_its_new_place():
     solver._rebuild(0)
     assert solver.rebuilds.numpy()[0] == before + 1
     assert set(listed(solver)) == near(solver, 6e-4)
-
-
-def test_a_grain_of_few_spheres_has_no_others():
-    # Boots have three of the nine sphere places of this build; the others would lie in the middle of the
-    # domain, where there is a grain.
-    rng = np.random.default_rng(5)
-    kinds = np.arange(40) % 2
-    places = rng.uniform(-0.008, 0.008, (40, 3))
-    places[0] = 0.0
-    bodies = grains(places, orientations=rng.normal(size=(40, 4)), shapes=kinds)
-    solver = solve(world(bodies, pair(), PILE_STEP, shapes=(PYRAMID, BOOT), skin=1e-3))
-    counts = np.where(kinds == 0, SPHERES, BOOT.sphere_count)
-    spheres = np.array([sphere for both in listed(solver) for sphere in both])
-    assert len(spheres) > 500
-    assert (spheres % SPHERES < counts[spheres // SPHERES]).all()
 
 
 def test_the_skin_does_not_change_the_motion(settled):

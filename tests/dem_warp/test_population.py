@@ -159,15 +159,3 @@ def test_a_mixed_rain_keeps_its_spheres_apart_and_inside():
     # Kept apart by 2 % of the sum of two radii, but for 1e-8 m of float32 in 0.1 m.
     assert gap[owner[:, None] != owner[None]].min() > 0.02 * 2.0 * radii.min() - 1e-8
     assert (np.hypot(*centers.T[:2]) + radii < 0.012).all()
-
-
-def test_a_rain_does_not_know_the_others_of_its_batch():
-    bodies = [
-        mixed(shape).draw(count, seed)
-        for seed, (count, shape) in enumerate([(60, BOTH), (90, ShapeMixture((BOOT,), (1.0,))), (30, BOTH)])
-    ]
-    together = fall(bodies, range(3))
-    for seed, drawn in enumerate(bodies):
-        [alone] = fall([drawn], [seed])
-        np.testing.assert_array_equal(alone.positions, together[seed].positions)
-        np.testing.assert_array_equal(alone.orientations, together[seed].orientations)

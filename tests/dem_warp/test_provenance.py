@@ -1,6 +1,7 @@
 """The engine's fingerprint: it follows what the code means, and not how it is written or explained."""
 
 import shutil
+import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -11,7 +12,7 @@ import warp as wp
 import dem_warp
 from dem_warp import provenance
 from dem_warp.laws.linear_cohesion import LinearCohesion
-from dem_warp.provenance import engine_fingerprint, source_meaning
+from dem_warp.provenance import CHANGE_NO_HEAP, engine_files, engine_fingerprint, source_meaning
 from dem_warp.version import source_commit
 
 SOURCE = '''
@@ -57,6 +58,27 @@ def test_the_meaning_of_the_kernels_is_written_out() -> None:
     text = (Path(dem_warp.__file__).parent / "kernels" / "contacts.py").read_text(encoding="utf-8")
     assert len(source_meaning(text)) > len(text)
     assert source_meaning(text.replace(" + ", " - ", 1)) != source_meaning(text)
+
+
+LOAD = """
+import sys
+import dem_warp.batch
+from dem_warp.laws.library import MECHANISMS
+from dem_warp.laws.mechanism import Mechanism
+from dem_warp.scenes.library import SCENES
+[*MECHANISMS.values(), *SCENES.values()]
+import dem_warp.kernels.rain
+own = {name: module for name, module in sys.modules.items() if name.startswith("dem_warp.")}
+print(*(name for name, module in own.items() if not hasattr(module, "__path__")))
+"""
+
+
+def test_the_fingerprint_covers_what_batches_laws_and_scenes_load() -> None:
+    printed = subprocess.run([sys.executable, "-c", LOAD], capture_output=True, text=True, check=True).stdout
+    loaded = {f"{name.replace('.', '/')}.py" for name in printed.split()}
+    covered = {name for name in engine_files() if not name.endswith("__init__.py")}
+    assert covered == loaded - set(CHANGE_NO_HEAP)
+    assert not covered & {"dem_warp/frames.py", "dem_warp/solids.py", "dem_warp/processes.py"}
 
 
 @pytest.fixture

@@ -54,14 +54,6 @@ def test_a_sparse_rain_keeps_its_rate():
     np.testing.assert_allclose(heights, np.arange(COUNT) * spacing, rtol=1e-6)
 
 
-def test_a_rain_depends_on_its_seed_alone():
-    first, second = rain(seeds=(1, 2))
-    for alone, together in zip((rain(seeds=(1,))[0], rain(seeds=(2,))[0]), (first, second), strict=True):
-        np.testing.assert_array_equal(alone.positions, together.positions)
-        np.testing.assert_array_equal(alone.orientations, together.orientations)
-    assert not np.allclose(first.positions, second.positions)
-
-
 def test_grains_are_turned_and_spread_evenly():
     fall = rain(spacing=3.0 * PYRAMID.bounding_radius)[0]
     np.testing.assert_allclose(np.linalg.norm(fall.orientations, axis=1), 1.0, rtol=1e-12)

@@ -69,24 +69,6 @@ def test_a_plane_that_turns_back_starts_from_where_it_stands():
     assert state(solver)["positions"][0, 2] == pytest.approx(height + RADIUS - OVERLAP, abs=1e-6 * OVERLAP)
 
 
-def test_a_tube_moves_alone_among_worlds():
-    def resting():
-        return world(
-            grains([0.0, 0.0, RADIUS - OVERLAP]),
-            CONTACT,
-            TIME_STEP,
-            walls=(Plane(),),
-            gravity=downhill(0.0),
-        )
-
-    solver = solve(resting(), resting())
-    solver.move_wall(1, 0, Motion(velocity=(0.0, 0.0, 0.05)))
-    solver.advance(8)
-    still, moved = (state(solver, w)["positions"][0, 2] for w in range(2))
-    assert still == pytest.approx(RADIUS - OVERLAP, abs=1e-9 * OVERLAP)
-    assert moved > RADIUS + 0.04 * 8 * 256 * TIME_STEP
-
-
 def test_a_moving_belt_takes_a_ball_along():
     belt = 0.1
     contact = pair(restitution=0.2, friction=0.3)
@@ -337,8 +319,3 @@ def test_a_motion_of_some_duration_leaves_the_wall_where_it_then_is():
     end = state(solver)
     assert end["positions"][0, 2] == pytest.approx(amplitude + RADIUS - OVERLAP, abs=1e-6 * OVERLAP)
     assert np.abs(end["velocities"]).max() < 1e-9
-
-
-def test_a_motion_takes_some_time():
-    with pytest.raises(ValueError, match=r"Motion.duration: must be positive \[s\], got 0"):
-        Motion(duration=0.0)

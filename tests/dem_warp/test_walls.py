@@ -74,15 +74,6 @@ def test_a_ball_rests_on_every_side_of_a_wall(wall, nearest, outward):
     np.testing.assert_allclose(end, foot + np.multiply(RADIUS - OVERLAP, outward), atol=1e-6 * OVERLAP)
 
 
-def test_a_tube_may_lean():
-    axis = np.array([0.0, 0.6, 0.8])
-    tube = Cylinder(point=(0.0, 0.0, 0.0), radius=0.02, length=0.06, direction=(0.0, 3.0, 4.0))
-    across = np.array([0.0, 0.8, -0.6])
-    foot = 0.03 * axis + 0.02 * across
-    end = settle(tube, foot - RADIUS * across, across)
-    np.testing.assert_allclose(end, foot - (RADIUS - OVERLAP) * across, atol=1e-6 * OVERLAP)
-
-
 def test_a_ball_passes_through_an_open_end():
     solver = solve(
         world(
@@ -113,22 +104,6 @@ def test_a_ball_falls_through_the_hole_of_a_plate():
     expected = 0.01 - GRAVITY * TIME_STEP**2 * n * (n + 1) / 2.0
     assert expected < -RADIUS
     np.testing.assert_allclose(state(solver)["positions"][0], [0.0, 0.0, expected], atol=1e-13)
-
-
-def test_a_cone_of_equal_radii_is_a_cylinder():
-    # A ball bounces about in the tube, with friction, and over its rim.
-    cone = Cone(TUBE.point, TUBE.radius, TUBE.radius, TUBE.length)
-    contact = pair(restitution=0.8, friction=0.4, rolling=0.02)
-    ends = []
-    for wall in (TUBE, cone):
-        ball = grains(np.add(TUBE.point, [0.01, 0.0, 0.03]), velocities=[0.6, 0.9, 0.35])
-        solver = solve(world(ball, contact, TIME_STEP, walls=(wall,)))
-        run_for(solver, 0.2)
-        ends.append(state(solver))
-    assert ends[0]["positions"][0, 2] > TUBE.length
-    assert np.abs(ends[0]["spins"]).max() > 10.0
-    # A distance differs by rounding, 1e-17 m of an overlap of some 1e-4 m; a dozen impacts keep it near that.
-    np.testing.assert_allclose(ends[1]["positions"], ends[0]["positions"], atol=1e-11)
 
 
 def test_the_wall_of_a_cone_carries_what_a_circling_ball_asks_for():

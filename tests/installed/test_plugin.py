@@ -1,6 +1,7 @@
 """A package from outside, installed, adds a law, a scene, a mechanism, a design and an engine."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -123,6 +124,11 @@ def test_cases_without_it_are_what_they_were(alone: dict[str, Any], together: di
     assert together["approach"] == alone["approach"] != 0.0
     assert together["key"] == alone["key"]
     assert together["keys by engine"] != [alone["key"]]
+
+
+def test_its_law_and_its_scene_conform(plugged: Installed) -> None:
+    shutil.copy(TESTS / "plugin" / "conformance.py", plugged.work)
+    plugged.python("-m", "pytest", "-q", "-p", "no:cacheprovider", "conformance.py")
 
 
 def test_a_scene_is_simulated(plugged: Installed) -> None:

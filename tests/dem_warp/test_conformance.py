@@ -1,0 +1,62 @@
+"""Conformance tests of dem_warp's own laws and scenes."""
+
+import pytest
+from worlds import STEEL, ball_case, small_case
+
+from dem_warp import testing
+from dem_warp.laws.library import MECHANISMS
+from dem_warp.laws.linear_cohesion import LinearCohesion
+from dem_warp.scenes.draw_down import DrawDown
+from dem_warp.scenes.drum import Drum
+from dem_warp.scenes.hopper import Hopper
+from dem_warp.scenes.library import SCENES
+
+PARAMETERS = {
+    "linear_cohesion": {"cohesion_energy_density": 2e4},
+    "wall_adhesion": {"wall_adhesion_energy_density": 2e4},
+    "jkr": {"work_of_adhesion": 0.05},
+    "capillary_bridge": {"surface_tension": 0.07, "bridge_volume": 2e-11, "contact_angle": 0.3},
+    "elastic_plastic_rolling": {"rolling_stiffness": 2.25, "rolling_damping": 0.3},
+    "twisting": {"twisting_radius": 0.5},
+    "rate_weakening": {"weakening": 0.5, "weakening_speed": 0.05},
+    "kinetic_friction": {"friction_drop": 0.3},
+    "hysteretic_spring": {"plasticity": 0.3},
+    "micro_slip": {"micro_slip": 1.0},
+}
+LAWS = [kind(**PARAMETERS[name]) for name, kind in MECHANISMS.items()]
+CASES = {
+    "lifted-cylinder": small_case(),
+    "hopper": ball_case(Hopper(0.03, 0.03, 0.016, STEEL, rain_rate=3000.0), 0.3),
+    "drum": ball_case(Drum(0.06, 0.012, STEEL, 2.0, filling=0.3, start_up=0.2, revolutions=0.3), 0.4, 0.05),
+    "draw-down": ball_case(DrawDown(0.05, 0.012, 0.02, 0.018, 0.03, STEEL), 0.3),
+}
+names = {"ids": lambda one: getattr(one, "name", None) or one.__name__}
+
+
+@pytest.mark.parametrize("law", LAWS, **names)
+@pytest.mark.parametrize("check", testing.LAW_CHECKS, **names)
+def test_laws(law, check):
+    check(law)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("check", testing.SCENE_CHECKS, **names)
+def test_scenes(scene, check):
+    check(CASES[scene])
+
+
+class Misdeclared(LinearCohesion):
+    strength = "cohesion"
+
+
+@pytest.mark.parametrize(
+    ("check", "wrong", "problem"),
+    [
+        (testing.law_checks_its_parameters, Misdeclared(), "strength must be the name of a parameter"),
+        (testing.law_acts_only_within_its_reach, LinearCohesion(), "changes no contact"),
+        (testing.scene_ends, small_case(scene=None, skin=1000.0), "must"),
+    ],
+)
+def test_a_wrong_law_or_scene_fails(check, wrong, problem):
+    with pytest.raises((AssertionError, ValueError), match=problem):
+        check(wrong)
