@@ -49,9 +49,9 @@ def test_fewer_observables_leave_the_rest_as_it_is() -> None:
 @pytest.mark.parametrize(
     ("rows", "more", "message"),
     [
-        ([[20.0]], {}, "a column for each of 2 observables"),
+        ([[20.0]], {}, "2 columns, one per observable"),
         ([[20.0, np.inf]], {}, "infinite"),
-        ([[20.0, 1.0]], {"reasons": {"base": ("", "")}}, "one entry a replicate"),
+        ([[20.0, 1.0]], {"reasons": {"base": ("", "")}}, "one entry per replicate"),
         ([[20.0, 1.0]], {"reasons": {"base": ("lost",)}}, "failed"),
     ],
 )
