@@ -41,7 +41,7 @@ _STATE = ("positions", "orientations", "velocities", "spins", "sizes", "release_
 
 
 def reference_case(scale: str, seed: int = 0) -> Case[LiftedCylinder]:
-    """The study's centre point with grains of one size, the reference clump."""
+    """Return the study's centre point with grains of one size, the reference clump."""
     if scale not in SCALES:
         raise ValueError(f"scale: must be one of {', '.join(SCALES)}, got {scale!r}")
     scene, softening = SCALES[scale]

@@ -5,8 +5,8 @@ are moved on too, but meet nobody: `of free grains` leaves them out. The columns
 (`--columns`); worlds beyond `--seeds` hold the same columns at other moments.
 
     python -m experiments.evidence.performance.heap_throughput --scale soft --device cpu --processes 2
-    python -m experiments.evidence.performance.heap_throughput --scale soft --peer lammps --peer liggghts --peer yade
-    python -m experiments.evidence.performance.heap_throughput --scale paper --device cuda --worlds 1,12,31,128
+    python -m experiments.evidence.performance.heap_throughput --scale soft --peer lammps --peer yade
+    python -m experiments.evidence.performance.heap_throughput --scale paper --device cuda --worlds 1,128
 
 Every table goes to `--out` as CSV, and all of them to throughput.md; those beside other codes to its folder
 peers and to peers.md. `record.py` puts both pages into README.md.

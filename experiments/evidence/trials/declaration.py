@@ -121,7 +121,7 @@ def declared_effect(
 
 
 def with_names(settings: Settings, library: Sequence[Declared]) -> Settings:
-    """Settings that let an analysis name the resolvable mechanisms and no other."""
+    """Return the settings that let an analysis name the resolvable mechanisms and no other."""
     return replace(settings, resolvable=tuple(effect.name for effect in library if effect.resolvable))
 
 

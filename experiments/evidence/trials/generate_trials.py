@@ -82,7 +82,7 @@ def bank_beside(scale: str) -> Path:
 
 
 def generators_study(scale: str) -> Study:
-    """The trial study with the generator's own time step and camera."""
+    """Return the trial study with the generator's own time step and camera."""
     study = load_study(STUDY, scale or None)
     changes: dict[str, Any] = {
         "numerics": {"time_step_fraction": STEP_SHARE * study.numerics.time_step_fraction},

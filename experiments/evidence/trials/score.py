@@ -186,7 +186,7 @@ def removed(table: pd.DataFrame) -> np.ndarray:
 
 
 def covered(table: pd.DataFrame) -> pd.Series:
-    """True where the stated 90 % interval holds the true size, of each right name of a single mechanism."""
+    """Return True where the 90 % interval holds the true size, for each right name of one mechanism."""
     right = table[table["right"] & (table["kind"] == Kind.SINGLE)]
     return right["true_size"].between(right["size_low"], right["size_high"])
 

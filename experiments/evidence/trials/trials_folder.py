@@ -36,7 +36,7 @@ class Folder:
         return self.data / f"{trial}.csv"
 
     def discovery(self, job: str) -> Path:
-        """The whole of what an analysis found."""
+        """Return the whole of what an analysis found."""
         return self.root / "discoveries" / f"{job}.json"
 
 

@@ -12,7 +12,7 @@ from experiments.evidence.performance.columns import Columns
 
 @pytest.fixture(scope="session")
 def small_columns(tmp_path_factory: pytest.TempPathFactory) -> Columns:
-    """The benchmarks' column with sixty grains, simulated and kept."""
+    """Return the benchmarks' column with sixty grains, simulated and kept."""
     tube = LiftedCylinder(0.020, 0.020, scene.STEEL, rain_rate=300.0, grain_count=60)
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(scene.SCALES, "small", (tube, 400.0))

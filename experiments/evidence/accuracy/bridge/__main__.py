@@ -1,4 +1,4 @@
-"""Bridges from cards of dem-warp to other codes, as ``python -m experiments.evidence.accuracy.bridge --out DIR``.
+"""Bridge cards of dem-warp to other codes: ``python -m experiments.evidence.accuracy.bridge --out DIR``.
 
 Each grain has its study here. It is calibrated by dem-warp on the CPU (some minutes of a core), and its card
 is bridged to each code by 12 runs, and verified by 5 fresh ones. What is finished in the folder is not run

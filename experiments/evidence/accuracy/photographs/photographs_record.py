@@ -1,6 +1,6 @@
 """Measure photograph-like pictures with and without heaps, and write how well it went.
 
-    python -m experiments.evidence.accuracy.photographs.photographs_record --first 100000 --heaps 500 --others 200 --out record
+    python -m experiments.evidence.accuracy.photographs.photographs_record --first 100000 --out record
 
 Seeds below 1000, 800000 to 800299 and those of earlier series were used while the rules were made; figures
 are for others. What a person notes in `notes.md` of the record's folder stands on its page.
@@ -55,7 +55,7 @@ def with_heap(seed: int) -> tuple[Row, Picture]:
 
 
 def in_hard_light(seed: int) -> tuple[Row, Picture]:
-    """The same for a heap that throws a sharp shadow on the wall beside it."""
+    """Return the same for a heap that throws a sharp shadow on the wall beside it."""
     return row_of(photograph_in_hard_light(seed), seed)
 
 
@@ -127,7 +127,7 @@ def contact_sheet(tiles: list[tuple[str, Picture]]) -> Picture:
 
 
 def summary(heaps: list[Row], others: list[Row], hard: list[Row]) -> str:
-    """The figures, as lines of Markdown."""
+    """Return the figures, as lines of Markdown."""
     silent = Counter(row["outcome"] for row in others)
     table = {f"pictures of heaps{name}": value for name, value in figures(heaps).items()}
     table["pictures without a heap"] = len(others)

@@ -55,8 +55,8 @@ def page(folder: Path = FOLDER) -> str:
         "two standard errors (`se`). With two measurements (*at least*) no rule is exact: none that is "
         "continuous in the data holds its level for all ratios of two unknown variances (the problem of "
         "Behrens and Fisher; Linnik 1968), and with one degree of freedom the best one found still goes from "
-        ".932 to .968 (`doe.samples.two_errors`). n: measurements behind a target. Spread: standard deviation of a "
-        "measurement over that of a run.",
+        ".932 to .968 (`doe.samples.two_errors`). n: measurements behind a target. Spread: standard "
+        "deviation of a measurement over that of a run.",
     ]
     for theme, title in TITLES.items():
         table = pd.read_csv(folder / f"{theme}.csv")

@@ -112,7 +112,7 @@ def judged(
     start: np.ndarray,
     end: np.ndarray,
 ) -> PeerRun:
-    """Result of a run whose spheres were at `start` and are at `end`: centres and radii [m], (n * S, 4)."""
+    """Return the result of a run by its spheres at start and end: centres and radii [m], (n * S, 4)."""
     walls = [wall for wall, _ in moment.setup.walls]
     shift = start[:, :3] - spheres_in_place(moment)[:, :3]
     return PeerRun(

@@ -47,7 +47,7 @@ def compare(name: PeerName, columns: Columns, steps: int, folder: Path) -> Part:
 
 
 def _below_rim(moment: Moment, tube: LiftedCylinder) -> Moment:
-    """The column without the grains that reach over the rim: a peer's tube has no rim."""
+    """Return the column without the grains that reach over the rim: a peer's tube has no rim."""
     setup = moment.setup
     grains, shape = setup.grains, setup.shapes[0]
     centers = placed_centers(shape, grains.positions, grains.orientations, grains.sizes)

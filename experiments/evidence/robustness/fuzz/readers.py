@@ -177,7 +177,7 @@ def bank(folder: Path) -> Reader:
 
 
 def stored(folder: Path) -> Reader:
-    """Stored cases."""
+    """Prepare stored cases."""
     [result] = simulate([_case()], "cpu", 1)
     store = Store(folder / "cases")
     store.save("seed", result)

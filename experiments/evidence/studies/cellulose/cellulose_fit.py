@@ -96,7 +96,7 @@ def measured_edge(rpm: int) -> pd.DataFrame:
 
 
 def residuals(rpm: int, curve: np.ndarray) -> np.ndarray:
-    """Simulated less measured edge at every place that was measured [mm]."""
+    """Return simulated less measured edge at every place that was measured [mm]."""
     edge = measured_edge(rpm)
     return np.interp(edge["x_mm"], 1e3 * places(), curve) - edge["z50_mm"].to_numpy()
 

@@ -73,8 +73,9 @@ def _parts(
     )
     return [
         f"# {study.name}",
-        "Written by `python -m experiments.evidence.studies.cellulose page`; `curves.csv.xz` holds the averaged edges of "
-        "all drums, `residuals.csv` how far each one is off, `prediction.csv` the prediction.",
+        "Written by `python -m experiments.evidence.studies.cellulose page`; `curves.csv.xz` holds "
+        "the averaged edges of all drums, `residuals.csv` how far each one is off, `prediction.csv` the "
+        "prediction.",
         study.note,
         "## Measured and simulated surfaces",
         *(f"![Edge at {rpm} revolutions a minute](edge-{rpm}.png)" for rpm in MEASURED),

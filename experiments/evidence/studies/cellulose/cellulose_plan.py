@@ -78,7 +78,7 @@ def coded(study: Study, table: pd.DataFrame) -> np.ndarray:
 
 
 def natural(study: Study, points: np.ndarray) -> pd.DataFrame:
-    """Settings of coded points, a column a factor."""
+    """Return the settings of coded points, a column a factor."""
     columns = zip(factors_of(study), np.atleast_2d(points).T, strict=True)
     return pd.DataFrame({f.name: f.center + f.half_range * column for f, column in columns})
 
@@ -119,7 +119,7 @@ def case_of(study: Study, row: pd.Series) -> Case:
 
 
 def grain_count(study: Study, fill: float) -> int:
-    """Number of grains that take a part of the drum's volume."""
+    """Return the number of grains that take a part of the drum's volume."""
     case = study.case({}, 0)
     drum = math.pi / 4 * case.scene.diameter**2 * case.scene.length
     grain = case.grains.mean(lambda shape: shape.volume)

@@ -1,7 +1,7 @@
 """Wheat in drums: one grain, five slopes, a friction for each wall, and the heap that they foretell.
 
     python -m experiments.evidence.studies.wheat_drums run --out out/wheat-drums
-    python -m experiments.evidence.studies.wheat_drums run --scale bench --device cpu --out out/wheat-drums-bench
+    python -m experiments.evidence.studies.wheat_drums run --scale bench --device cpu --out out/drums
     python -m experiments.evidence.studies.wheat_drums page --out out/wheat-drums
     python -m experiments.evidence.studies.wheat_drums search --out out/wheat-drums
 

@@ -43,7 +43,8 @@ def write_record(folder: Path) -> Path:
     return write_page(
         folder / PAGE,
         f"# {study.name}",
-        "Written by `python -m experiments.evidence.studies.wheat_drums page` from `drums.csv` and `heaps.csv`.",
+        "Written by `python -m experiments.evidence.studies.wheat_drums page` from `drums.csv` and "
+        "`heaps.csv`.",
         study.note,
         "## What the five data pin down",
         f"Ranges hold {LEVEL:.0%} of the settings that all five are compatible with. A setting stays open "

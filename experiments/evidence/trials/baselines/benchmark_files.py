@@ -69,7 +69,7 @@ class Benchmark:
         return tuple(fit_emulator(bank) for bank in self.banks)
 
     def problem(self, trial: Posed) -> Problem:
-        """A trial as a method sees it."""
+        """Return a trial as a method sees it."""
         known = self.emulators[trial.bank].without(*trial.withheld)
         seed = zlib.crc32(trial.name.encode())
         return Problem(trial.name, known, trial.measured, self.rules[trial.bank], seed)

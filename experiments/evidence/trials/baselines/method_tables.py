@@ -114,7 +114,7 @@ def _scores(column: pd.Series) -> np.ndarray:
 
 
 def has_outside(parts: Parts) -> bool:
-    """True for a method that scores *not in the library*."""
+    """Return True for a method that scores *not in the library*."""
     return bool(parts.table["outside"].notna().any())
 
 
@@ -204,7 +204,7 @@ def paired(first: pd.Series, second: pd.Series) -> Paired:
 
 
 def due(answers: pd.DataFrame) -> pd.Series:
-    """True where one answer is due: all but weak effects, and what was declared not resolvable."""
+    """Return True where one answer is due: all but weak effects, and what was declared not resolvable."""
     weak = (answers["kind"] == Kind.SINGLE) & (answers["multiple"] < STRONG)
     return ~weak & (answers["kind"] != Kind.UNRESOLVED)
 

@@ -76,12 +76,12 @@ class Problem:
         return (*self.evidence.training, *self.evidence.held_out)
 
     def stack(self, mechanisms: Mechanisms) -> Stack:
-        """A model against all means."""
+        """Return a model against all means."""
         systematic = self.settings.systematic
         return Stack(Model(self.emulator, mechanisms, systematic, views=self.evidence.views), self.blocks)
 
     def fitted(self, mechanisms: Mechanisms = ()) -> Fitted:
-        """A model at its largest likelihood."""
+        """Return a model at its largest likelihood."""
         if mechanisms not in self._fits:
             starts = None
             if mechanisms:

@@ -18,7 +18,7 @@ from experiments.studyfile import Study, load_study
 
 
 def workshop_study(scale: str) -> Study:
-    """The trial study with the other workshop's camera."""
+    """Return the trial study with the other workshop's camera."""
     pixels = round(PIXEL_SHARE * load_study(STUDY, scale or None).measurement.pixels)
     return load_study(STUDY, scale or None, {"measurement": {"pixels": pixels}})
 

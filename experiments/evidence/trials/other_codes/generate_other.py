@@ -1,6 +1,6 @@
 """Draw, seal and measure trials whose heaps another code makes.
 
-    python -m experiments.evidence.trials.other_codes.generate_other seal out/liggghts --code liggghts --scale bench
+    python -m experiments.evidence.trials.other_codes.generate_other seal out/liggghts --code liggghts
     python -m experiments.evidence.trials.other_codes.generate_other measure out/liggghts --seconds 3000
     python -m experiments.evidence.trials.other_codes.generate_other resume RECORD out/elsewhere
 

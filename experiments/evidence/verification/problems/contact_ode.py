@@ -46,7 +46,7 @@ class _Contact:
         self.spins = np.array([impact.spin, impact.partner.spin if impact.partner else 0.0])
 
     def forces(self, y: np.ndarray) -> tuple[float, float, float]:
-        """Normal force [N], tangential stiffness [N/m] and damping [N s/m]."""
+        """Return the normal force [N], tangential stiffness [N/m] and damping [N s/m]."""
         law, mass = self.impact.law, self.impact.effective_mass
         root = math.sqrt(self.impact.effective_radius * max(y[0], 0.0))
         stiffness, tangential = 2.0 * law.modulus * root, 8.0 * law.shear_modulus * root

@@ -107,7 +107,7 @@ def _law_rows(problem: str, case: str, account: EnergyAccount) -> list[Row]:
 
 
 def _wrong_law_rows(problem: str, setup: WorldSetup, device: str) -> list[Row]:
-    """A law 2 % off in any of its constants does not pass for the simulator's."""
+    """Check that a law 2 % off in any of its constants does not pass for the simulator's."""
     law = setup.contacts[0]
     wrong = [replace(law, **{name: 1.02 * getattr(law, name)}) for name in CONSTANTS]
     accounts = watched(setup, 0.3 * SETTLING, wrong, device)
@@ -130,7 +130,7 @@ def _parts_plot(account: EnergyAccount) -> Plot:
 
 
 def energy(device: str) -> Result:
-    """The closed account of a settling column."""
+    """Return the closed account of a settling column."""
     problem = "Settling column"
     shape = ClumpShape.read(CLUMP)
     setups = [column(shape, 16, 0.0075, fraction) for fraction in FRACTIONS]

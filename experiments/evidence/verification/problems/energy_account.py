@@ -78,7 +78,8 @@ class EnergyAccount:
     @property
     def parts(self) -> np.ndarray:
         """Energies of the `PARTS` after each step but the last: stored, and lost so far, (steps, parts)
-        [J]."""
+        [J].
+        """
         return np.array(self._rows)
 
     def see(self, state: Any) -> None:

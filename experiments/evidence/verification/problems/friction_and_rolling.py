@@ -59,7 +59,7 @@ def ball(
     speed: float = 0.0,
     spin: tuple[float, ...] = (0.0, 0.0, 0.0),
 ) -> WorldSetup:
-    """A ball that stands on a plane under its own weight, and moves along x."""
+    """Follow a ball that stands on a plane under its own weight, and moves along x."""
     place = [0.0, 0.0, RADIUS - static_overlap(law, slope)]
     grains = bodies(place, SUBSTANCE.density, velocities=[speed, 0.0, 0.0], spins=spin)
     shape = ClumpShape.sphere(RADIUS)
@@ -74,14 +74,14 @@ def advanced(setups: list[WorldSetup], time: float, precision: str, device: str)
 
 
 def sliding_row(precision: str, device: str) -> Row:
-    """A sliding ball comes to roll at 5/7 of its speed."""
+    """Check that a sliding ball comes to roll at 5/7 of its speed."""
     solver = advanced([ball(rolling_law(0.2), speed=SPEED)], 0.05, precision, device)
     labels = ("Sliding turns to rolling", f"mu = 0.2, {PRECISIONS[precision]}", "speed over v0", "5/7")
     return relative_row(labels, 5.0 / 7.0, solver.poses(0)["velocities"][0, 0] / SPEED, 1e-3)
 
 
 def stopping_rows(precision: str, device: str) -> list[Row]:
-    """A rolling ball stops where the constant directional torque says, and stays."""
+    """Check that a rolling ball stops where the constant directional torque says, and stays."""
     law = rolling_law(0.5, ROLLING)
     arm = lever(law)
     # m a = -f and (2/5) m R^2 a / L = f L - mu_r m g L, with L the lever
@@ -98,7 +98,7 @@ def stopping_rows(precision: str, device: str) -> list[Row]:
 
 
 def twisting(device: str) -> tuple[list[Row], Plot]:
-    """A spin about the normal falls on a straight line to zero and never turns back."""
+    """Check that a spin about the normal falls on a straight line to zero and never turns back."""
     law, spin = rolling_law(0.0, ROLLING), 5.0
     rate = ROLLING * GRAVITY * lever(law) / (0.4 * RADIUS**2)
     seen = record([ball(law, spin=(0.0, 0.0, spin))], int(1.4 * spin / rate / STEP), device).spins[:, 0, 0, 2]
@@ -118,7 +118,7 @@ def twisting(device: str) -> tuple[list[Row], Plot]:
 
 
 def creep_rows(precision: str, device: str) -> list[Row]:
-    """A ball on half its rolling angle stays for ten seconds."""
+    """Check that a ball on half its rolling angle stays for ten seconds."""
     rolling = 0.2
     slope = math.degrees(math.atan(0.5 * rolling))
     solver = advanced([ball(rolling_law(0.8, rolling), slope)], 0.5, precision, device)
@@ -132,7 +132,7 @@ def creep_rows(precision: str, device: str) -> list[Row]:
 
 
 def clump_rows(precision: str, device: str) -> list[Row]:
-    """A clump on three feet holds below the friction angle and slides above it."""
+    """Check that a clump on three feet holds below the friction angle and slides above it."""
     shape = ClumpShape.read(CLUMP)
     law = contact(BUCKWHEAT, BUCKWHEAT, 0.2, CLUMP_FRICTION)
     foot = -float((shape.centers[:, 2] - shape.radii).min())

@@ -47,12 +47,12 @@ class LiftedMesh(LiftedCylinder):
     """A lifted cylinder whose tube is made of triangles."""
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
-        """The plate and the tube."""
+        """Return the plate and the tube."""
         return self.plate, Mesh.tube(self.diameter / 2, self.height, SEGMENTS)
 
 
 def with_numerics(case: Case, **changes: Any) -> Case:
-    """The same case, computed in another way."""
+    """Return the same case, computed in another way."""
     return replace(case, numerics=replace(case.numerics, **changes))
 
 

@@ -1,5 +1,6 @@
 """One impact of a sphere on a plane or on another sphere: its settings, its Hertz solution, its
-simulation."""
+simulation.
+"""
 
 import math
 from collections.abc import Sequence
@@ -94,7 +95,7 @@ class Impact:
         return self.duration / (0.25 * rayleigh_time(self.radius, self.material))
 
     def world(self, time_step: float, phase: float) -> WorldSetup:
-        """The impact a step before; `phase` of a step later the spheres meet."""
+        """Return the impact a step before; `phase` of a step later the spheres meet."""
         gap = (1.0 + phase) * time_step * self.normal_speed
         fall = [self.tangential_speed, 0.0, -self.normal_speed]
         positions, velocities = [[0.0, 0.0, self.radius + gap]], [fall]

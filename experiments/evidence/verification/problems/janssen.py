@@ -159,7 +159,7 @@ def _lattice(radius: float, count: int) -> np.ndarray:
 
 
 def draw(setups: Sequence[WorldSetup], device: str) -> list[Loads]:
-    """Loads of columns that settle, and whose tubes are then drawn upwards."""
+    """Return the loads of columns that settle, and whose tubes are then drawn upwards."""
     solver = Solver(setups, device)
     worlds, chunk = range(len(setups)), CHUNK * setups[0].time_step
     solver.advance(round(SETTLING / chunk))
@@ -176,7 +176,7 @@ def draw(setups: Sequence[WorldSetup], device: str) -> list[Loads]:
 
 
 def _loads(setup: WorldSetup, positions: np.ndarray, path: np.ndarray) -> Loads:
-    """Loads of a column whose spheres were at positions [m], (samples, n, 3)."""
+    """Return the loads of a column whose spheres were at positions [m], (samples, n, 3)."""
     radius, weights = setup.walls[TUBE][0].radius, GRAVITY * setup.masses
     heights, from_axis = positions[..., 2], np.hypot(positions[..., 0], positions[..., 1])
     floor = _hertz(setup, heights).sum(axis=1)
@@ -264,7 +264,7 @@ def _mobilisation_plot(loads: Mapping[int, Sequence[Loads]]) -> Plot:
 
 
 def janssen(device: str) -> Result:
-    """Loads on the floor and the wall of a tube that is drawn upwards."""
+    """Return the loads on the floor and the wall of a tube that is drawn upwards."""
     problem = "Spheres in a tube that is drawn upwards"
     setups = [column(ratio, seed) for ratio in TUBES for seed in range(SEEDS)]
     drawn = draw(setups, device)

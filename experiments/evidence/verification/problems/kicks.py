@@ -34,12 +34,12 @@ def simulated_courses(
 
 
 def kicks_of(courses: Sequence[Course]) -> np.ndarray:
-    """Changes of tangential speed and of surface speed by spin over the largest by friction, (n, 2)."""
+    """Return changes of tangential speed and of surface speed by spin over the largest friction, (n, 2)."""
     return np.array([_scaled(c.impact, c.velocities[-1, 0, 0], c.spins[-1, 0, 1]) for c in courses])
 
 
 def solved_kicks(impacts: Sequence[Impact]) -> np.ndarray:
-    """The same of the law's differential equation."""
+    """Return the same of the law's differential equation."""
     rebounds = [solve_impact(impact) for impact in impacts]
     return np.array([_scaled(i, r.tangential[0], r.spins[0]) for i, r in zip(impacts, rebounds, strict=True)])
 

@@ -38,7 +38,7 @@ def liggghts_contacts(device: str) -> Result:
 
 
 def paths(laws: ContactLaws) -> list[PathSetup]:
-    """Set up every path; the sphere that rolls on the plate comes to rest, where the two resistances differ."""
+    """Set up every path; the sphere on the plate rolls to rest, where the two resistances differ."""
     setups = {setup.path.name: setup for setup in every_path(laws)}
     rolling = setups["plate, rolling"]
     slow = replace(rolling.path, speeds=((0.003, 0.0, 0.0),), spins=((0.0, 2.0, 0.0),), duration=6.0e-3)

@@ -140,7 +140,7 @@ def _theory_rows(
 
 
 def _ring_rows(impacts: Sequence[Impact], got: np.ndarray, theory: Rebound, device: str) -> list[Row]:
-    """The simulator with the mechanism, which is to give the theory."""
+    """Return the simulator with the mechanism, which is to give the theory."""
     case = f"mechanism micro_slip, {len(SLIPS)} slips"
     fits = simulate_impacts(impacts, ORDERS[1], device, PHASES, "mixed", length=2.0)
     where = f"{case}, production precision, {ORDERS[1]} steps, first step at {len(PHASES)} phases"

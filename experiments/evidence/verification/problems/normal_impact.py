@@ -99,7 +99,8 @@ def _hertz(impact: Impact) -> tuple[float, float, float, float]:
 
 def hertz_rows(problem: str, case: str, courses: list[Course], tolerance: float) -> list[Row]:
     """Overlap, force, duration, speed after, and the whole force curve against Hertz, the worst course
-    each."""
+    each.
+    """
     want = np.array([_hertz(c.impact) for c in courses])
     seen = np.array([_seen(c) for c in courses])
     rows = [
@@ -118,12 +119,7 @@ def _hertz_errors(courses: list[Course]) -> np.ndarray:
 
 
 def _drop_on_tip(restitution: float, device: str) -> tuple[float, np.ndarray, np.ndarray]:
-    """Steps, largest forces [N] and speeds after [m/s] of a buckwheat grain on steel, as the campaign takes
-    them.
-
-    The grain falls along its axis, and the contact under its centre, at `TIP_SPEED`: mass and sphere are
-    those of a head-on impact. One value a phase.
-    """
+    """Return steps, largest forces [N] and speeds after [m/s] of a buckwheat grain on steel."""
     shape = ClumpShape.read(CLUMP)
     time_step = 0.25 * rayleigh_time(float(shape.radii.min()), BUCKWHEAT)
     reach = float((shape.centers[:, 2] + shape.radii).max())

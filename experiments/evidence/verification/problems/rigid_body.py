@@ -1,5 +1,6 @@
 """Motion of a free rigid grain: Poinsot's invariants and Euler's equations; momentum of clumps that
-collide."""
+collide.
+"""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -52,7 +53,7 @@ rounding."""
 
 
 def tumbling(time_step: float) -> WorldSetup:
-    """A free boot that turns about its unstable axis."""
+    """Follow a free boot that turns about its unstable axis."""
     grains = bodies([0.0, 0.0, 0.0], BUCKWHEAT.density, spins=SPIN)
     return world(grains, BOOT, contact(BUCKWHEAT, BUCKWHEAT), time_step)
 
@@ -75,7 +76,7 @@ def euler_spins(moments: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def _tumble(time_step: float, chunks: int, precision: str, device: str) -> tuple[np.ndarray, ...]:
-    """Times [s], body-frame spins, drifts of momentum and of energy, after each 1/16 of the way."""
+    """Return times [s], body-frame spins, drifts of momentum and of energy, after each 1/16 of the way."""
     setup = tumbling(time_step)
     solver = Solver([setup], device, precision)
     times, spins, momenta, energies = [0.0], [SPIN], [], []
@@ -122,7 +123,7 @@ def _top(device: str) -> tuple[list[Row], Plot]:
 
 
 def _orders(device: str) -> list[Row]:
-    """The same 0.66 s in steps of different lengths."""
+    """Return the same 0.66 s in steps of different lengths."""
     moments = tumbling(STEP).inertias[0]
     errors = []
     for coarser in COARSER:

@@ -84,7 +84,7 @@ def world(
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     extent: float | None = None,
 ) -> WorldSetup:
-    """A world in which one contact law holds for grains and walls alike.
+    """Return a world in which one contact law holds for grains and walls alike.
 
     `extent` [m] is half the side of its domain, by default 40 times a grain's reach. Speeds up to a hundred
     times the fastest at the start, and 10 m/s, are no divergence.

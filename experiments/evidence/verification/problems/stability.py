@@ -35,7 +35,7 @@ trembling in place: then the scene fails by its own rule of rest, with the same 
 
 
 def corners(study: Study) -> list[Case]:
-    """The runs of the screening, one seed each."""
+    """Return the runs of the screening, one seed each."""
     runs = planned_cases(1, ["screening"])
     names = [factor.name for factor in study.factors]
     return [
@@ -45,7 +45,7 @@ def corners(study: Study) -> list[Case]:
 
 
 def ended_in_order(result: CaseResult) -> bool:
-    """True if a case finished, or was flagged with the advice to take."""
+    """Return True if a case finished, or was flagged with the advice to take."""
     return result.status == "finished" or ADVICE in result.reason
 
 

@@ -142,7 +142,7 @@ def test_a_case_too_large_for_a_device_ends_alone_and_says_so(
 
 
 def test_checkpoints_take_two_percent_of_a_launch_at_most() -> None:
-    """That of a world of 2,500 clumps takes 0.04 s with a slow disk (`experiments/evidence/performance/README.md`)."""
+    """A checkpoint of a world of 2,500 clumps takes 0.04 s with a slow disk."""
     assert own.checkpoint_interval(1) == 60.0
     for worlds in (30, 31, 128, 1024):
         assert 0.04 * worlds <= 0.02 * own.checkpoint_interval(worlds) * (1.0 + 1e-9)

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.evidence.accuracy.travel import heaps as travel
+from experiments.evidence.accuracy.travel import travel_heaps as travel
 from experiments.evidence.accuracy.travel.__main__ import RECORD
 from experiments.evidence.accuracy.travel.cards import (
     CARDS,

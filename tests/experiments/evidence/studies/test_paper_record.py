@@ -57,7 +57,7 @@ def campaign(study: Study) -> Campaign:
 
 @pytest.fixture(scope="module")
 def committed() -> Record:
-    """The record in the tree."""
+    """Return the record in the tree."""
     return Record.read(paper_record.FOLDER)
 
 

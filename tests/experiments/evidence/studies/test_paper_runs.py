@@ -33,7 +33,7 @@ def simulated(angle: Callable[[pd.DataFrame], pd.Series], replicates: int = 1) -
 
 @pytest.fixture(scope="module")
 def perfect() -> Replay:
-    """A simulator that gives the printed angles."""
+    """Return a simulator that gives the printed angles."""
     return simulated(lambda cases: cases["published"])
 
 

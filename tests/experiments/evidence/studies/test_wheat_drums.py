@@ -41,7 +41,7 @@ def drums_of(study: Study, count: int = 22) -> pd.DataFrame:
 
 
 def measured_of(truth: np.ndarray) -> dict:
-    """Data of the made-up model at its truth, with the errors of the real ones."""
+    """Return data of the made-up model at its truth, with the errors of the real ones."""
     drums = np.array([[*truth[:2], wall, truth[-1]] for wall in truth[2:]])
     means = [slope(drums, np.zeros(4)).mean(), *slope(drums, np.ones(4))]
     return {

@@ -27,7 +27,7 @@ G = 9.81
 
 
 def case_of() -> Case:
-    """A test in the setting of LAMMPS's workshop."""
+    """Return a test in the setting of LAMMPS's workshop."""
     return Setting(1.0, 1000.0, 48, 4e-3, "sds").of(load_study(STUDY, "bench").case(THETA, seed=3), "lammps")
 
 

@@ -56,7 +56,7 @@ with_programs = pytest.mark.parametrize(
 
 
 def case_of(code: str = "liggghts") -> Case:
-    """A test of few grains, in the setting of a code's workshop."""
+    """Return a test of few grains, in the setting of a code's workshop."""
     case = load_study(STUDY, "bench", SMALL).case(THETA, seed=3)
     return SETTINGS[code].of(case, code)
 
@@ -335,7 +335,7 @@ Sizes = tuple[tuple[str, float], ...]
 
 
 def observed(code: str, folder: Path, *sizes: Sizes, seed: int = 12) -> list[dict[str, float] | str]:
-    """Observables of small tests that a code runs, each with some effects; or the reason why it has no heap."""
+    """Observables of small tests that a code runs, each with some effects; or why one has no heap."""
     study, table = load_study(STUDY, "bench", SMALL), OutcomeTable(folder / "outcomes.sqlite")
     points = [Point(tuple(THETA.values()), own, "base", seed) for own in sizes]
     with OtherCodeSimulator(study, code, SETTINGS[code], table, OwnWorkers("cpu", 1)) as simulator:

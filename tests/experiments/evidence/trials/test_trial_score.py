@@ -81,7 +81,7 @@ def test_shares_have_the_intervals_of_clopper_and_pearson() -> None:
 
 
 def ideal_trials() -> tuple[pd.DataFrame, dict[str, Label]]:
-    """Findings of an analysis that is right wherever it can be."""
+    """Return findings of an analysis that is right wherever it can be."""
     labels: dict[str, Label] = {f"null-{i}": label_of(Kind.NULL) for i in range(100)}
     labels |= {
         f"{name}-{i}": label_of(Kind.SINGLE, name, multiple=1.6 + i / 10)

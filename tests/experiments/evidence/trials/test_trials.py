@@ -189,7 +189,7 @@ class Echo:
 
 
 def counting(name: str) -> Analysis:
-    """An analysis of as many waves as its name says; its reason is what it was sent."""
+    """Return an analysis of as many waves as its name says; its reason is what it was sent."""
     number = int(name)
     if number == 0:
         raise ValueError("no waves")

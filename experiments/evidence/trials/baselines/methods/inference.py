@@ -73,7 +73,7 @@ class Sbi:
 
 
 def is_installed() -> bool:
-    """True where `sbi` can be imported."""
+    """Return True where `sbi` can be imported."""
     return find_spec("sbi") is not None
 
 
