@@ -43,14 +43,9 @@ class HeapPicture:
 
 
 def heap_pictures(campaign: Campaign, study: Study, load: Callable[[str], CaseResult]) -> list[HeapPicture]:
-    """Draw heaps of every stage that say most: the flattest and steepest, and those of the verification.
+    """Draw the flattest and steepest heaps of every stage, and heaps of the verification.
 
-    Parameters
-    ----------
-    campaign, study
-        What was run.
-    load
-        Finds the result of a case by its ``case_key``, as ``Store.load`` does.
+    `load` finds the result of a case by its ``case_key``, as ``Store.load`` does.
     """
     cases = campaign.cases
     kept = campaign.selection.kept if campaign.selection else ()

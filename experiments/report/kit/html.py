@@ -44,18 +44,9 @@ class Chapter:
 def render_page(
     kind: str, heading: str, summary: str, chapters: Sequence[Chapter], context: Mapping[str, Any]
 ) -> str:
-    """Render a page: 4.8 MB of plotly.js, and what it holds.
+    """Render a page with its chapters and 4.8 MB of plotly.js.
 
-    Parameters
-    ----------
-    kind, heading
-        What the page is, and what it is about.
-    summary
-        Template of the summary.
-    chapters
-        In their order.
-    context
-        What the templates of summary and chapters draw on.
+    `summary` is the template of its beginning, `context` has the values of all templates.
     """
     page = environment().get_template("page.html.j2")
     shared = {"theme": theme, "plotly": Markup(get_plotlyjs()), "SHORT_ROWS": SHORT_ROWS}

@@ -92,21 +92,10 @@ def make_table(
     note: str = "",
     marks: Sequence[str] | pd.Series | None = None,
 ) -> Table:
-    """Lay out a DataFrame.
+    """Lay out a DataFrame, whose named index is a column like any other.
 
-    Parameters
-    ----------
-    name
-        Anchor in the page.
-    frame
-        One row a row. A named index is a column like any other.
-    columns
-        What to show, in order; a column that the frame lacks is left out. A key alone means the column
-        of `KNOWN`, else for a text below its own name.
-    caption, note
-        Above and below the table.
-    marks
-        Style of each row.
+    Columns that it lacks are left out; a key alone means the column of `KNOWN`, else a text below its own
+    name. `name` is the anchor in the page, `marks` are the styles of the rows.
     """
     if frame.index.name is not None:
         frame = frame.reset_index()
