@@ -66,11 +66,6 @@ def test_nearest_point_of_a_plane_is_its_foot(count):
     assert coded(surface.nearest(3.4)) == pytest.approx(foot, abs=1e-7)
 
 
-def test_nearest_point_stays_in_the_box():
-    surface = surface_of(lambda x, y: x + 0.1 * y, 2)
-    assert coded(surface.nearest(1.05)) == pytest.approx([1.0, 0.5], abs=1e-7)
-
-
 @pytest.mark.parametrize(
     ("function", "kind"),
     [

@@ -13,7 +13,6 @@ from doe import (
     effect_power,
     fit_surface,
     noise_floor,
-    variance_ratio,
 )
 from doe.design.factors import Factor
 
@@ -27,11 +26,6 @@ def test_noise_floor_of_five_by_tables():
     assert floor.sd_interval == pytest.approx(
         (2.0 * np.sqrt(4.0 / 11.1433), 2.0 * np.sqrt(4.0 / 0.4844)), rel=1e-4
     )
-
-
-def test_variance_ratio_of_equal_squares_on_equal_degrees_is_even():
-    ratio = variance_ratio(2.0, 7, 2.0, 7)
-    assert (ratio.F, ratio.p) == pytest.approx((1.0, 0.5), rel=1e-12)
 
 
 def test_curvature_is_the_lack_of_fit_of_a_plane_with_centers():
