@@ -48,14 +48,7 @@ OnAdvance = Callable[["Batch"], None]
 class Batch:
     """Cases of one kind of scene, precision and largest number of spheres, as worlds of one launch.
 
-    Parameters
-    ----------
-    cases : sequence of Case
-    device : str
-    checkpoints : Checkpoints, optional
-        Files that the cases are saved to and continue from.
-    on_advance : OnAdvance, optional
-        Called after every `advance`.
+    They are saved to `checkpoints` and continue from there; `on_advance` is called after every `advance`.
     """
 
     def __init__(
@@ -211,14 +204,8 @@ def begin(
 ) -> tuple[Batch | None, list[int], dict[int, CaseResult]]:
     """Begin a batch of the valid cases, and fail the others.
 
-    Returns
-    -------
-    batch
-        None if no case is valid.
-    begun
-        Index of the case of each world.
-    refused
-        Results of the other cases by index, each with its reason.
+    Return the batch (None without a valid case), the index of the case of each world, and the results of the
+    other cases by index, each with its reason.
     """
     try:
         return Batch(cases, device, checkpoints, on_advance), list(range(len(cases))), {}

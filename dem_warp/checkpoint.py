@@ -1,8 +1,7 @@
 """Checkpoints: running cases on disk, from which a killed run continues.
 
-Every running case has a file named by its content. It is written under a temporary name and then renamed, so
-that it is complete or absent. A damaged file, or one of another engine version or device, is not used: its
-case starts again.
+Every running case has a file named by its content, complete or absent. A damaged file, or one of another
+engine version or device, is not used: its case starts again.
 """
 
 import hashlib
@@ -32,20 +31,7 @@ _log = logging.getLogger(__name__)
 
 
 class Checkpoints:
-    """Checkpoints of cases in a folder.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Created with the first checkpoint.
-    every : float
-        Wall time between two checkpoints [s].
-
-    Raises
-    ------
-    ValueError
-        If `every` is negative.
-    """
+    """Checkpoints of cases in a folder, with a wall time between two of them."""
 
     def __init__(self, folder: str | Path, every: float = CHECKPOINT_EVERY) -> None:
         if not every >= 0:
@@ -76,13 +62,7 @@ class Checkpoints:
             _log.warning("%s: cannot write the checkpoint, the case continues without: %s", path, error)
 
     def load(self, case: Case, maker: dict[str, Any]) -> tuple[dict[str, Any], Snapshot] | None:
-        """Return the state's fields and the snapshot of a case from an earlier run, or None without a file.
-
-        Raises
-        ------
-        ValueError
-            If the file is damaged or comes from another maker.
-        """
+        """Return the state's fields and the snapshot of a case from an earlier run, or None."""
         path = self.path(case)
         if not path.exists():
             return None

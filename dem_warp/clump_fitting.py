@@ -52,28 +52,19 @@ class ClumpFit:
 
 
 def fit_clump(solid: "Trimesh", sphere_count: int, protrusion: float = 0.0, resolution: int = 40) -> ClumpFit:
-    """Fill a closed surface with spheres that cover much of its volume.
+    """Fill a closed surface [m] with spheres that cover much of its volume.
 
     Each sphere in turn covers the most of the remaining volume. Then spheres are exchanged and moved, with
-    radii from the distance to the surface, as long as the covered volume grows. Nothing is random: the same
-    solid gives the same clump.
+    radii from the distance to the surface, as long as the covered volume grows. Nothing is random.
 
     Parameters
     ----------
-    solid
-        Closed surface [m], from `solids.read_mesh` or `solids.parse_solid`.
     sphere_count
         Number of spheres; there are fewer if more would cover nothing new.
     protrusion
         Largest distance of a sphere's surface outside the solid [m]: sharp edges are covered better.
     resolution
-        Samples along the solid's longest side. Coverage and overshoot have errors of about
-        1 / resolution^1.5.
-
-    Raises
-    ------
-    ValueError
-        If the solid is not closed, the sphere count or the resolution too small, or the protrusion negative.
+        Samples along the longest side. Coverage and overshoot have errors of about 1 / resolution^1.5.
     """
     _check_request(solid, sphere_count, protrusion, resolution)
     surface = _Surface(solid)

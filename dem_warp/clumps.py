@@ -27,11 +27,6 @@ class ClumpShape:
 
     `from_spheres`, `read` and `sphere` compute the mass properties and the frame. Two shapes are equal when
     their spheres are.
-
-    Raises
-    ------
-    ValueError
-        If an array has the wrong shape or a value is not finite, or a radius, volume or moment not positive.
     """
 
     centers: Array
@@ -85,21 +80,11 @@ class ClumpShape:
     def from_spheres(
         cls, centers: ArrayLike, radii: ArrayLike, resolution: int = DEFAULT_RESOLUTION
     ) -> "ClumpShape":
-        """Build a shape from spheres in any frame.
+        """Build a shape from spheres in any frame, (S, 3) and (S,) [m]; their order stays.
 
-        Parameters
-        ----------
-        centers, radii
-            Spheres [m], shapes (S, 3) and (S,). Their order is kept.
-        resolution
-            Gauss nodes of the surface quadrature, see `sphere_union.union_moments`. Default: 64, for a
-            relative error below 1e-4.
-
-        Returns
-        -------
-        ClumpShape
-            The spheres, moved and turned into the principal frame of their union that is nearest to the given
-            frame: axes are not sorted, and principal axes stay, within 1e-4 of the largest moment.
+        They are moved and turned into the principal frame of their union that is nearest to the given frame:
+        axes are not sorted, and principal axes stay, within 1e-4 of the largest moment. `resolution` is that
+        of `sphere_union.union_moments`; 64 gives a relative error below 1e-4.
 
         Raises
         ------
@@ -115,16 +100,7 @@ class ClumpShape:
     def elongated(self, elongation: float) -> "ClumpShape":
         """Return the shape stretched along its longest principal axis, with the same volume.
 
-        Parameters
-        ----------
-        elongation
-            Relative stretch of the centres along the axis of the least moment of inertia; the whole is then
-            scaled to its former volume. 0: no change.
-
-        Raises
-        ------
-        ValueError
-            If the elongation is not finite or below 0, or not 0 for a single sphere.
+        `elongation` is the relative stretch of the centres; it must be 0 for a single sphere.
         """
         Parameter("1", at_least=0.0).check("elongation", elongation)
         if elongation == 0.0:
@@ -148,13 +124,7 @@ class ClumpShape:
     def read(cls, path: str | Path) -> "ClumpShape":
         """Read spheres in any frame, one per line: ``x y z r`` in mm; ``#`` starts a comment.
 
-        Raises
-        ------
-        ValueError
-            If a line is not four finite numbers with a positive radius, or the file has no sphere or too
-            many; the message names the file and the line.
-        FileNotFoundError
-            If there is no such file.
+        A ValueError names the file and the line; FileNotFoundError is raised without a file.
         """
         rows = []
         for number, line in enumerate(read_text(path).splitlines(), start=1):

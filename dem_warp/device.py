@@ -10,13 +10,7 @@ NO_DRIVER = "Could not find or load the NVIDIA CUDA driver"
 
 
 def resolve_device(device: str | None) -> str:
-    """Return the name of a device: "cpu", "cuda" or "cuda:N". Default: the GPU if there is one.
-
-    Raises
-    ------
-    ValueError
-        If there is no such device.
-    """
+    """Return the name of a device: "cpu", "cuda" or "cuda:N". Default: the GPU if there is one."""
     _start_warp()
     known = [str(d) for d in wp.get_devices()]
     if device is None:

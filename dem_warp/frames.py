@@ -73,24 +73,8 @@ def simulate_frames(
 ) -> tuple[CaseResult, Film | None]:
     """Simulate one case, and return its result, with the bits of `simulate`, and frames.
 
-    Parameters
-    ----------
-    case : Case
-    count : int
-        Frames, including the first state and the last; a very short case has fewer.
-    device, on_progress
-        As in `simulate`.
-
-    Returns
-    -------
-    result : CaseResult
-    film : Film or None
-        None if the case could not begin.
-
-    Raises
-    ------
-    ValueError
-        If `count` is below LEAST_FRAMES, or there is no such device.
+    `count` includes the first state and the last, and is LEAST_FRAMES or more; a very short case has fewer.
+    The other parameters are as in `simulate`. The film is None if the case could not begin.
     """
     if count < LEAST_FRAMES:
         raise ValueError(f"simulate_frames.count: must be {LEAST_FRAMES} or more, got {count!r}")

@@ -11,13 +11,7 @@ from dem_warp.parameters import Parameter, check_parameters
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic, linearly elastic solid.
-
-    Raises
-    ------
-    ValueError
-        If a value lies outside its range.
-    """
+    """Isotropic, linearly elastic solid."""
 
     density: Annotated[float, Parameter("kg/m^3", above=0.0)]
     """Density of the solid."""
@@ -40,13 +34,7 @@ _RESTITUTION = Parameter("1", above=0.0, at_most=1.0)
 
 @dataclass(frozen=True)
 class Interaction:
-    """Contact properties of one pair of surfaces.
-
-    Raises
-    ------
-    ValueError
-        If a value lies outside its range.
-    """
+    """Contact properties of one pair of surfaces."""
 
     restitution: Annotated[float, _RESTITUTION]
     """Coefficient of restitution; 1 is without damping."""
@@ -72,29 +60,13 @@ class WallPart:
 
 
 def rayleigh_time(radius: float, material: Material) -> float:
-    """Return the time that a Rayleigh wave takes to cross a sphere's half circumference.
+    """Return the time of a Rayleigh wave over half a sphere's circumference [s].
 
-    Parameters
-    ----------
-    radius
-        Radius of the sphere [m], positive.
-    material
-        Material of the sphere.
-
-    Returns
-    -------
-    float
-        ``pi R sqrt(rho / G) / (0.1631 v + 0.8766)`` [s].
-
-    Raises
-    ------
-    ValueError
-        If the radius is not finite and positive.
+    It is ``pi R sqrt(rho / G) / (0.1631 v + 0.8766)`` for a radius [m].
 
     References
     ----------
-    Thornton and Randall (1988), in Micromechanics of Granular Materials, 133-142; the time step of a
-    simulation is a fraction of it.
+    Thornton and Randall (1988), in Micromechanics of Granular Materials, 133-142.
     """
     Parameter("m", above=0.0).check("rayleigh_time.radius", radius)
     speed_ratio = 0.1631 * material.poisson_ratio + 0.8766
@@ -102,13 +74,9 @@ def rayleigh_time(radius: float, material: Material) -> float:
 
 
 def effective_moduli(a: Material, b: Material) -> tuple[float, float]:
-    """Return the effective Young's and shear moduli of two bodies in contact.
+    """Return the effective Young's and shear moduli of two bodies in contact, E* and G* [Pa].
 
-    Returns
-    -------
-    tuple of float
-        ``E*`` and ``G*`` [Pa], from ``1/E* = (1 - va^2)/Ea + (1 - vb^2)/Eb`` and
-        ``1/G* = (2 - va)/Ga + (2 - vb)/Gb``.
+    ``1/E* = (1 - va^2)/Ea + (1 - vb^2)/Eb`` and ``1/G* = (2 - va)/Ga + (2 - vb)/Gb``.
 
     References
     ----------
@@ -122,21 +90,12 @@ def effective_moduli(a: Material, b: Material) -> tuple[float, float]:
 def damping_coefficient(restitution: float) -> float:
     """Return the dimensionless damping that gives a Hertz contact a restitution.
 
-    Returns
-    -------
-    float
-        ``2 sqrt(5/6) |beta|`` with ``beta = ln e / sqrt(ln^2 e + pi^2)``; the damping force is this, times
-        ``sqrt(S m*)`` (contact stiffness, effective mass), times the relative speed. 0 at ``e = 1``.
-
-    Raises
-    ------
-    ValueError
-        If the restitution lies outside its range.
+    It is ``2 sqrt(5/6) |beta|`` with ``beta = ln e / sqrt(ln^2 e + pi^2)``; the damping force is this, times
+    ``sqrt(S m*)`` (contact stiffness, effective mass), times the relative speed.
 
     References
     ----------
-    Tsuji, Tanaka and Ishida (1992), Powder Technology 71, 239-250, in the form of the Hertz-Mindlin
-    (no slip) model of EDEM.
+    Tsuji, Tanaka and Ishida (1992), Powder Technology 71, 239-250, in the form of EDEM's Hertz-Mindlin model.
     """
     _RESTITUTION.check("restitution", restitution)
     log_restitution = math.log(restitution)
@@ -156,11 +115,6 @@ THORNTON_POLYNOMIAL = (
 def tsuji_damping(restitution: float) -> float:
     """Return the damping of `damping_coefficient` that LAMMPS uses for a restitution.
 
-    Raises
-    ------
-    ValueError
-        If the restitution lies outside its range.
-
     References
     ----------
     LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 987-991, damping tsuji.
@@ -171,11 +125,6 @@ def tsuji_damping(restitution: float) -> float:
 
 def thornton_damping(restitution: float) -> float:
     """Return the damping of `damping_coefficient` that Yade uses for a restitution, without attraction.
-
-    Raises
-    ------
-    ValueError
-        If the restitution lies outside its range.
 
     References
     ----------

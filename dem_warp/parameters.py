@@ -1,7 +1,6 @@
-"""Parameters that a person sets: numbers with unit and bounds.
+"""Parameters that a person sets: numbers with unit and bounds, and named choices.
 
-A scene or a law states both once, in the type of a field: ``Annotated[float, Parameter("m", above=0.0)]``.
-The object checks itself by them, and readers of files take them from here.
+The type of a field has both: ``Annotated[float, Parameter("m", above=0.0)]``.
 """
 
 import math
@@ -22,13 +21,7 @@ LATER = {"later": True}
 
 @dataclass(frozen=True)
 class Parameter:
-    """Unit and bounds of a finite number.
-
-    Raises
-    ------
-    ValueError
-        When the unit is not one of `UNITS`.
-    """
+    """Unit and bounds of a finite number."""
 
     unit: str
     """SI unit, e.g. ``"kg/m^3"``; ``"1"`` for a number without unit."""
@@ -64,13 +57,7 @@ class Parameter:
 
 @cache
 def parameters_of(kind: type) -> dict[str, Parameter]:
-    """Return the parameters of a dataclass by name, in the order of its fields.
-
-    Raises
-    ------
-    TypeError
-        When a field is a number without unit and bounds.
-    """
+    """Return the parameters of a dataclass by name, in the order of its fields."""
     hints = get_type_hints(kind, include_extras=True)
     for name, hint in hints.items():
         if hint in (float, int, float | None, int | None):
@@ -87,13 +74,7 @@ def choices_of(kind: type) -> dict[str, tuple[Any, ...]]:
 
 
 def check_parameters(instance: object) -> None:
-    """Check every parameter and every named choice of a dataclass; None passes where a parameter is optional.
-
-    Raises
-    ------
-    ValueError
-        With class and field, the rule and the value received.
-    """
+    """Check every parameter and every named choice of a dataclass; None passes if it is optional."""
     kind: Any = type(instance)
     for name, known in choices_of(kind).items():
         require_choice(f"{kind.__name__}.{name}", getattr(instance, name), known)

@@ -36,13 +36,7 @@ def _check_sum(place: str, fractions: tuple[float, ...]) -> None:
 
 @dataclass(frozen=True)
 class ShapeMixture:
-    """Several shapes, each with its part of the grains.
-
-    Raises
-    ------
-    ValueError
-        If there is no shape, or a fraction is wrong.
-    """
+    """Several shapes, each with its part of the grains."""
 
     shapes: tuple[ClumpShape, ...]
     fractions: tuple[float, ...]
@@ -72,13 +66,7 @@ CHANGES, STRAY = 4, 1.5
 
 @dataclass(frozen=True)
 class SizeClasses:
-    """Discrete sizes, each with its part of the number of grains.
-
-    Raises
-    ------
-    ValueError
-        If the sizes do not increase, or a fraction is wrong.
-    """
+    """Discrete sizes, each with its part of the number of grains."""
 
     sizes: tuple[float, ...]
     """Scales of the shape, increasing."""
@@ -181,13 +169,7 @@ def _mean_and_sd(classes: SizeClasses) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class GrainPopulation:
-    """Grains of one material with varying sizes and shapes.
-
-    Raises
-    ------
-    ValueError
-        If a size is out of its range.
-    """
+    """Grains of one material with varying sizes and shapes."""
 
     shape: ClumpShape | ShapeMixture
     material: Material

@@ -126,11 +126,6 @@ class Processes:
 
     They start with the first cases and end with the ``with`` block.
 
-    Parameters
-    ----------
-    count : int
-        Number of processes.
-
     Examples
     --------
     >>> with Processes(2) as processes:
@@ -161,17 +156,8 @@ class Processes:
     ) -> None:
         """Run cases, `count` at a time; the cases of a lost process continue in another one.
 
-        Parameters
-        ----------
-        cases, on_result, checkpoints, on_advance
-            As in `simulate`.
-        report : callable
-            Called regularly with the fraction done and the phase of every case.
-
-        Raises
-        ------
-        concurrent.futures.process.BrokenProcessPool
-            When processes are lost LOSSES times without an ended case.
+        `report` is called regularly with the fraction done and the phase of every case; the other parameters
+        are as in `simulate`. BrokenProcessPool is raised after LOSSES losses without an ended case.
         """
         fractions, phases = [0.0] * len(cases), ["waiting"] * len(cases)
 

@@ -23,12 +23,8 @@ def engine_fingerprint(*parts: Any) -> str:
     """Return the hash of all code that can change a heap, and of the version of Warp.
 
     It covers batches, laws, scenes and everything that these import, by file name and syntax tree: comments,
-    docstrings and formatting do not count.
-
-    Parameters
-    ----------
-    parts : types or functions
-        Laws and scenes in use. The packages of those outside dem_warp are hashed too.
+    docstrings and formatting do not count. Of `parts` (laws and scenes in use) outside dem_warp, the whole
+    packages are hashed too.
     """
     outside = {part.__module__ for part in parts if _top(part.__module__) != PACKAGE}
     return _fingerprint(tuple(sorted(outside)))

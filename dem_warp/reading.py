@@ -12,15 +12,7 @@ LARGEST_TEXT = 10_000_000
 
 
 def read_text(path: str | Path, largest: int = LARGEST_TEXT) -> str:
-    """Read a text file in UTF-8.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    ValueError
-        If it is not a regular file, too large, or not UTF-8.
-    """
+    """Read a text file in UTF-8; raise ValueError if it is no regular file, too large, or not UTF-8."""
     file = Path(path)
     facts = file.stat()
     if not stat.S_ISREG(facts.st_mode):

@@ -16,10 +16,7 @@ _log = logging.getLogger(__name__)
 class Modules(Mapping[str, T], Generic[T]):
     """Lazy mapping of built-in names; a module is imported on first access.
 
-    Parameters
-    ----------
-    places : mapping
-        Module and attribute of each name, e.g. ``"dem_warp.laws.jkr:JKR"``.
+    `places` has the module and attribute of each name, e.g. ``"dem_warp.laws.jkr:JKR"``.
     """
 
     def __init__(self, places: Mapping[str, str]) -> None:
@@ -48,17 +45,9 @@ class Registry(Mapping[str, T], Generic[T]):
         [project.entry-points."dem_warp.laws"]
         magnetism = "grain_magnets.law:Magnetism"
 
-    Entry points are loaded once, on first access. Invalid ones are skipped with a warning.
-
-    Parameters
-    ----------
-    group : str
-        Group of the entry points, e.g. ``"dem_warp.laws"``.
-    built_in : mapping
-        Built-in objects by name.
-    check : callable
-        Called with name and object of an entry, and with all objects before it; raises ValueError or
-        TypeError for an invalid one.
+    Entry points of the group are loaded once, on first access. `check` is called with the name and the object
+    of an entry, and with all objects before it; it raises ValueError or TypeError for an invalid one, which
+    is skipped with a warning.
     """
 
     def __init__(

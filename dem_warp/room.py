@@ -9,13 +9,7 @@ from dem_warp.triangles import meshes_of, most_within
 
 
 def neighbour_room(world: WorldSetup) -> tuple[int, int]:
-    """Return the largest expected numbers of partners of a sphere and of entries of a grain.
-
-    Raises
-    ------
-    ValueError
-        If the lists of a world would be too long.
-    """
+    """Return the largest expected numbers of partners of a sphere and of entries of a grain."""
     found, listed = 16, 32
     for shape, others in product(world.shapes, repeat=2):
         reach = shape.radii.mean() + others.radii.mean() + world.skin + world.reach

@@ -26,7 +26,7 @@ def simulate(
     checkpoint_every: float = CHECKPOINT_EVERY,
     on_advance: OnAdvance | None = None,
 ) -> list[CaseResult]:
-    """Simulate cases at once.
+    """Simulate cases at once, and return their results in order.
 
     Parameters
     ----------
@@ -36,28 +36,21 @@ def simulate(
     workers : int or Processes, optional
         Processes on a CPU, where Warp's kernels use one thread. Default: one per core. A number of processes
         start for this call; `Processes` stay for the next one.
-    on_result : callable, optional
-        Called with the index and the result of each case as it ends.
-    on_progress : callable, optional
-        Called regularly with a `Progress`.
+    on_result, on_progress : callable, optional
+        Called with index and result of each ended case, and regularly with a `Progress`.
     checkpoint : str or Path, optional
-        Folder for checkpoints of the running cases. Cases that a killed run left there continue, to the same
-        bits; the file of a case is removed when it has ended.
+        Folder for checkpoints. Cases that a killed run left there continue, to the same bits; the file of an
+        ended case is removed.
     checkpoint_every : float
         Wall time between two checkpoints [s].
     on_advance : callable, optional
         Called with each running `Batch` after every advance, in its process; it must not change the batch.
 
-    Returns
-    -------
-    list of CaseResult
-        Results in the order of the cases. A failed case has its status; it neither raises nor changes another
-        case.
-
     Raises
     ------
     ValueError
-        If there is no such device, or `checkpoint_every` is negative.
+        If there is no such device, or `checkpoint_every` is negative. A failed case has its status; it
+        neither raises nor changes another case.
     """
     name = resolve_device(device)
     checkpoints = None if checkpoint is None else Checkpoints(checkpoint, checkpoint_every)

@@ -1,8 +1,7 @@
 """One world's part of a batch's device arrays, copied and restored.
 
-A snapshot is independent of its batch: the world may continue in any batch of its build, at any place, with
-the same bits. The arrays are found in the structs, and their division follows from their length, so that a
-new field of the state needs no change here.
+A snapshot is independent of its batch: the world may continue in any batch of its build with the same bits.
+The arrays are found in the structs, so that a new field of the state needs no change here.
 """
 
 from collections.abc import Iterator
@@ -36,11 +35,8 @@ def take_snapshot(solver: Solver, world: int) -> Snapshot:
 def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
     """Restore a world from a snapshot.
 
-    Raises
-    ------
-    ValueError
-        When the snapshot is of another kind of world, its lists are too long, or a value in it is impossible.
-        The world is then unchanged.
+    Raise ValueError, without a change, if it is of another kind of world, its lists are too long, or a value
+    in it is impossible.
     """
     if COUNT not in snapshot:
         raise ValueError(f"snapshot: must have {COUNT}, got {sorted(snapshot)}")

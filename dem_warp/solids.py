@@ -26,21 +26,10 @@ LARGEST_MESH = 50_000_000
 
 
 def read_mesh(path: str | Path, unit: float = MILLIMETER) -> "Trimesh":
-    """Read a closed surface from a mesh file, scale it to metres, and turn its faces outward.
+    """Read a closed surface from an STL, OBJ, PLY or OFF file, in metres, with its faces turned outward.
 
-    Parameters
-    ----------
-    path
-        STL, OBJ, PLY or OFF, of at most `LARGEST_MESH` bytes.
-    unit
-        Length of the file's unit [m].
-
-    Raises
-    ------
-    ValueError
-        If the unit is not positive, the file is not a mesh, or the surface is not closed.
-    FileNotFoundError
-        If there is no such file.
+    `unit` is the length of the file's unit [m]. A ValueError says what is wrong with the file;
+    FileNotFoundError is raised without a file.
     """
     Parameter("m", above=0.0).check("read_mesh.unit", unit)
     kind = Path(path).suffix.lower().removeprefix(".")
@@ -160,13 +149,7 @@ SOLIDS: MappingProxyType[str, Callable[..., "Trimesh"]] = MappingProxyType(
 
 
 def parse_solid(text: str) -> "Trimesh":
-    """Make a solid [m] from a name of `SOLIDS` and its dimensions in mm, e.g. ``tri-pyramid:5.90x3.93``.
-
-    Raises
-    ------
-    ValueError
-        If the name is unknown, or the dimensions are not the right number of positive lengths.
-    """
+    """Make a solid [m] from a name of `SOLIDS` and its dimensions in mm, e.g. ``tri-pyramid:5.90x3.93``."""
     name, _, dimensions = text.partition(":")
     if name not in SOLIDS:
         raise ValueError(f"solid: must be one of {', '.join(map(describe_solid, SOLIDS))} [mm], got {text!r}")

@@ -57,19 +57,12 @@ ANY_PACE = 1.0e9
 
 
 class Solver:
-    """A batch of worlds on one device.
+    """A batch of worlds on one device, with equal numbers of walls and contacts, and equal mechanisms.
 
     Every world has its own time step and parameters; worlds share only the launches. The state of a world
     after a number of steps depends on its setup alone, not on other worlds, its place, the lanes or the skin.
-
-    Parameters
-    ----------
-    worlds : sequence of WorldSetup
-        Worlds with equal numbers of walls and contacts, and equal mechanisms.
-    device : str or warp Device
-    precision : "mixed" or "double"
-    capacity : int, optional
-        Neighbours per grain. Default: from the densest packing of the spheres.
+    `precision` is "mixed" or "double"; `capacity` is the number of neighbours per grain. Default: from the
+    densest packing of the spheres.
     """
 
     def __init__(

@@ -36,7 +36,7 @@ class CheckRate(IntEnum):
     """Frequency of the checks of the neighbour lists."""
 
     USUAL = 0
-    """As rare as the fastest grain allows."""
+    """Checks as rare as the fastest grain allows."""
     CLOSE = 1
     """Every other step: a grain at rest may be hit, or begin to roll, sooner than its lists allow."""
     EVERY_STEP = 2

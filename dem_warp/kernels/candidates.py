@@ -1,8 +1,7 @@
 """Validity of the neighbour lists, and the candidates for contacts in the next steps.
 
-The speeds of a grain and of its neighbours limit its path in the next steps. Only the entries of a list that
-are nearer than the paths of the two can touch: the step uses these alone. Afterwards a world is flagged if a
-grain came farther. Grains that wait high above all others, as at the beginning of a rain, are left out.
+The speeds of a grain and of its neighbours limit its path. The next steps use only the entries of a list that
+are nearer than the paths of the two. Afterwards a world is flagged if a grain came farther.
 """
 
 import functools

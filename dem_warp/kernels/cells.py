@@ -1,7 +1,6 @@
 """Search of near spheres in a hash grid of cells: each bucket is a run of spheres in memory.
 
-The grid wraps around in each direction; the distance of spheres separates two cells of one bucket. Only
-worlds whose `stale` flag is set are searched. Places in memory are assigned in a race, and partners of a
+Only worlds whose `stale` flag is set are searched. Places in memory are assigned in a race, and partners of a
 sphere are found in any order; `neighbours` sorts them.
 """
 

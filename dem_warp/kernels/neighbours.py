@@ -1,12 +1,9 @@
 """Neighbour lists: every sphere of another grain, and every wall, within the skin of a sphere.
 
 On a GPU two grains list each other; on a CPU, which computes each pair once, the earlier one lists the other.
-Walls are numbered after the spheres of their world.
-
-A list is sorted by the own sphere's number and then by the partner's. So its order, and the order of a
-grain's force sum, depends on the grains alone: not on cells, skin, time of the rebuild or batch. Only worlds
-whose `stale` flag is set are rebuilt: all lists, or those affected by moved grains. A new list is written as
-a draft, with the histories of the old one, and then copied into place.
+A list is sorted by the own sphere's number and then by the partner's (walls come last). So its order, and the
+order of a grain's force sum, depends on the grains alone. Only worlds whose `stale` flag is set are rebuilt:
+a new list is written as a draft, with the histories of the old one, and then copied into place.
 """
 
 import functools

@@ -143,9 +143,7 @@ def _float_spheres(precision: Precision) -> SimpleNamespace:
 def packing(precision: Precision) -> SimpleNamespace:
     """Return functions on packed spheres and histories in one precision.
 
-    `pack(position, last, world)`, `pack_offset(center, offset, last, world)`, `difference(a, b, world)` [m],
-    `last(a)` (the radius of a sphere, the size factor of a centre), `place(a, world)` [m], `stamp`,
-    `stamped_step`, and `load_*`, `store_*`.
+    `last` is the radius of a sphere or the size factor of a centre; `difference` and `place` are in metres.
     """
     sphere, vec4 = precision.sphere, precision.vec4
     World = device_structs(precision).World

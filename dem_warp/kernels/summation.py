@@ -1,11 +1,8 @@
 """Sum of the contacts of a grain, in the order of its neighbour list.
 
-On a CPU a single thread takes the grains in order. It computes the candidates of a grain and adds the
-opposite force to each partner; so the sum begins with the reactions of earlier grains, in their order.
-
-The lanes of a GPU warp share the candidates of all its grains, 32 items at once; then the grains' lanes add
-up, component by component, in the order of the list. Any number of lanes adds the same floats in the same
-order; items without contact add zero.
+On a CPU a single thread takes the grains in order and adds the opposite of each force to the partner. The
+lanes of a GPU warp share the candidates of all its grains, 32 items at once; then the grains' lanes add up in
+the order of the list. Any number of lanes adds the same floats; items without contact add zero.
 """
 
 import functools

@@ -1,8 +1,7 @@
 """Contacts of a sphere with a mesh of triangles: one at each nearest point of the surface.
 
-Each triangle is a partner, so a sphere in a corner touches several. If the nearest point is on an edge or in
-a corner, the contact belongs to the nearest of the triangles that share it, and to the first of equally near
-ones. No contact is lost or counted twice, because all triangles compute the same distances, bit for bit.
+If that point is on an edge or in a corner, the contact belongs to the nearest of the triangles that share it,
+and to the first of equally near ones: all compute the same distances, bit for bit.
 """
 
 import functools

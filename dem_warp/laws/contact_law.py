@@ -81,11 +81,6 @@ def contact_law(mechanisms: Mechanisms, forms: LawForms = BASE_FORMS) -> Any:
 
     Both dampings use the constant 2 sqrt(5/6) |beta|, each with its own stiffness, as in EDEM, unless
     `params` and the forms say otherwise.
-
-    Raises
-    ------
-    ValueError
-        If several mechanisms replace the same part of the law, or one replaces a law that is not the base's.
     """
     check_forms(mechanisms, forms)
     attractions, springs = _hooks(mechanisms, "attraction"), _hooks(mechanisms, "spring")

@@ -59,13 +59,7 @@ BASE_FORMS = LawForms("tsuji", "displacement", "spring", "push", "own_spin")
 
 @dataclass(frozen=True, kw_only=True)
 class ContactLaws:
-    """Conventions of a contact law; the defaults are the base law.
-
-    Raises
-    ------
-    ValueError
-        When a choice is unknown, or a number is missing or breaks its bounds.
-    """
+    """Conventions of a contact law; the defaults are the base law."""
 
     normal: Normal = "hertz"
     """Radius of the contact area: Hertz's, or the radius of the circle in which the shapes overlap."""

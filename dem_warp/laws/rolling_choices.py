@@ -1,8 +1,7 @@
-"""Laws of rolling resistance; `conventions.Rolling` names them.
+"""Laws of rolling resistance that are torques of a contact; `conventions.Rolling` names them.
 
 Each acts on the relative rotation of the two bodies, except EDEM's RVD (mean of their spins) and DEM-Engine's
-(sliding velocity of the spins). Choices that act on a grain's own spin are limits for the integration
-(`rolling.resist_spin`).
+(sliding velocity of the spins). The other laws limit a grain's own spin (`rolling.resist_spin`).
 """
 
 from collections.abc import Mapping

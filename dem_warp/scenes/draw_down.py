@@ -76,25 +76,20 @@ class DrawDown(PouredScene):
 
     @property
     def floor(self) -> float:
-        """Floor of the upper box [m]."""
         return self.drop
 
     @property
     def brim(self) -> float:
-        """Height of the filling of the upper box [m]."""
         return self.drop + self.fill_depth
 
     @property
     def opening(self) -> float:
-        """Width of the slot [m]."""
         return self.slot
 
     def volume_below(self, height: float) -> float:
-        """Return the volume of the upper box up to a height [m3]."""
         return self.width * self.depth * (height - self.drop)
 
     def cross_section(self, reach: float) -> CrossSection:
-        """Return the inside of the boxes."""
         return CrossSection((self.width / 2, self.depth / 2))
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
@@ -117,11 +112,9 @@ class DrawDown(PouredScene):
         return [(start, -y, z), (end, -y, z), (end, y, z), (start, y, z)]
 
     def room(self, reach: float) -> tuple[float, float, float]:
-        """Return the space of both boxes."""
         return self.width / 2 + 2 * reach, self.depth / 2 + 2 * reach, -2 * reach
 
     def controller(self, case: Case[Any], setup: WorldSetup, chunk: int) -> "DrawDownController":
-        """Return the controller of one case."""
         return DrawDownController(case, setup, chunk)
 
 
@@ -132,7 +125,6 @@ class DrawDownController(DischargeController):
 
     @property
     def gate_path(self) -> float:
-        """End of the gate's path, below the lower floor [m]."""
         return self.case.scene.drop + 2.0 * self.reach
 
     @property
@@ -142,11 +134,9 @@ class DrawDownController(DischargeController):
         return box.volume / (math.sqrt(GRAVITY) * box.depth * box.slot**1.5) + 0.3
 
     def came_out(self, view: WorldView) -> np.ndarray:
-        """Mark the grains below the upper floor."""
         return view.alive & (view.positions[:, 2] < self.case.scene.drop)
 
     def over_outlet(self, view: WorldView) -> np.ndarray:
-        """Mark the grains near the middle plane of the slot."""
         return np.abs(view.positions[:, 0]) < OVER_SLOT * self.case.scene.slot
 
     def why_clogged(self, view: WorldView) -> str:
@@ -158,7 +148,6 @@ class DrawDownController(DischargeController):
         return super().why_clogged(view)
 
     def measure(self, view: WorldView) -> dict[str, float]:
-        """Measure the slopes above and the heap below."""
         below = self.came_out(view)
         above = view.alive & ~below
         left = view.masses[above & (view.positions[:, 0] < 0)].sum()

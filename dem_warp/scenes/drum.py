@@ -152,7 +152,6 @@ class Drum(PouredScene):
 
     @property
     def brim(self) -> float:
-        """Height of a level bed of `filling` above the shell's lowest line [m]."""
         return level_of(self.filling, self.diameter / 2)
 
     @property
@@ -171,7 +170,6 @@ class Drum(PouredScene):
         return self.brim + self.length / 2 * math.tan(self.inclination)
 
     def volume_below(self, height: float) -> float:
-        """Return the volume of the drum up to a height [m3]."""
         radius = self.diameter / 2
         angle = 2 * math.acos(float(np.clip(1 - height / radius, -1.0, 1.0)))
         return radius**2 / 2 * (angle - math.sin(angle)) * self.length
@@ -181,13 +179,11 @@ class Drum(PouredScene):
         return self.hatch if self.is_hatched else max(self.brim + reach, self.diameter / 2)
 
     def cross_section(self, reach: float) -> CrossSection:
-        """Return the widest box for a grain at its release height."""
         above_axis = self.release(reach) - self.diameter / 2 + reach
         half_width = math.sqrt(max((self.diameter / 2) ** 2 - above_axis**2, 0.0))
         return CrossSection((half_width, self.length / 2))
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
-        """Return the shell and the ends."""
         radius, half, axis = self.diameter / 2, self.length / 2, (0.0, 1.0, 0.0)
         return (
             Cylinder((0.0, -half, radius), radius, self.length, axis),
@@ -196,16 +192,13 @@ class Drum(PouredScene):
         )
 
     def room(self, reach: float) -> tuple[float, float, float]:
-        """Return the space of the drum."""
         return self.diameter / 2 + 2 * reach, self.length / 2 + 2 * reach, -2 * reach
 
     @property
     def fall_height(self) -> float:
-        """Diameter of the drum [m]."""
         return self.diameter
 
     def controller(self, case: Case[Any], setup: WorldSetup, chunk: int) -> "DrumController":
-        """Return the controller of one case."""
         return DrumController(case, setup, chunk)
 
 

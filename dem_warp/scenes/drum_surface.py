@@ -84,14 +84,8 @@ def surface_angles(
 ) -> SurfaceAngles | None:
     """Return the slopes of the bed in a drum; None if a part of its surface is too short for a line.
 
-    Parameters
-    ----------
-    positions, reach
-        As in `DrumView.seen`; the bed is high at -x.
-    chord : float
-        Half the length of the surface in the cross-section [m]; a picture of the end uses its own.
-    view : DrumView, optional
-        The drum and the picture. Default: the mean over the depth.
+    The bed is high at -x; `positions` and `reach` are as in `DrumView.seen`. `chord` is half the length of
+    the surface [m]; a picture of the end uses its own. Without a view it is the mean over the depth.
     """
     if (levelled := _levelled(positions, reach, view)) is None:
         return None

@@ -52,20 +52,16 @@ class Hopper(PouredScene):
 
     @property
     def brim(self) -> float:
-        """Height of the filling [m]."""
         return self.fill_depth
 
     @property
     def opening(self) -> float:
-        """Diameter of the outlet [m]."""
         return self.outlet
 
     def volume_below(self, height: float) -> float:
-        """Return the volume of the bin up to a height [m3]."""
         return np.pi / 4 * self.diameter**2 * height
 
     def cross_section(self, reach: float) -> CrossSection:
-        """Return the inside of the bin."""
         return CrossSection.circle(self.diameter / 2)
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
@@ -78,12 +74,10 @@ class Hopper(PouredScene):
         )
 
     def room(self, reach: float) -> tuple[float, float, float]:
-        """Return the space of the bin and below its outlet."""
         half_width = self.diameter / 2 + 2 * reach
         return half_width, half_width, -DEPTH * reach
 
     def controller(self, case: Case[Any], setup: WorldSetup, chunk: int) -> "HopperController":
-        """Return the controller of one case."""
         return HopperController(case, setup, chunk)
 
 
@@ -94,7 +88,6 @@ class HopperController(DischargeController):
 
     @property
     def gate_path(self) -> float:
-        """End of the gate's path, below the lowest grains [m]."""
         return (DEPTH + 2.0) * self.reach
 
     @property
@@ -108,6 +101,5 @@ class HopperController(DischargeController):
         return view.positions[:, 2] < 0.0
 
     def over_outlet(self, view: WorldView) -> np.ndarray:
-        """Mark the grains near the axis."""
         from_axis = np.hypot(view.positions[:, 0], view.positions[:, 1])
         return from_axis < OVER_OUTLET * self.case.scene.outlet

@@ -146,19 +146,15 @@ class LiftedCylinder(PouredScene):
 
     @property
     def brim(self) -> float:
-        """Rim of the tube [m]."""
         return self.height
 
     def volume_below(self, height: float) -> float:
-        """Return the volume of the tube up to a height [m3]."""
         return np.pi / 4 * self.diameter**2 * height
 
     def cross_section(self, reach: float) -> CrossSection:
-        """Return the inside of the tube."""
         return CrossSection.circle(self.diameter / 2)
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
-        """Return the plate and the tube."""
         return self.plate, Cylinder((0.0, 0.0, 0.0), self.diameter / 2, self.height)
 
     def contacts(self, case: Case[Any]) -> tuple[ContactCoefficients, ...]:
@@ -170,7 +166,6 @@ class LiftedCylinder(PouredScene):
         return grains, tube, replace(tube, static_friction=friction)
 
     def contact_of(self, wall: int) -> int:
-        """Return the index of the contact of a wall."""
         return 2 if wall == PLATE else 1
 
     def check_parts(self, names: Sequence[str]) -> None:
@@ -182,12 +177,10 @@ class LiftedCylinder(PouredScene):
             raise ValueError(f"LiftedCylinder.{name}: {rule}, got {getattr(self, name)!r}")
 
     def room(self, reach: float) -> tuple[float, float, float]:
-        """Return a space wide enough for the flattest heap."""
         half_width = 4.0 * self.diameter + 2.0 * self.height
         return half_width, half_width, -2 * reach
 
     def controller(self, case: Case[Any], setup: WorldSetup, chunk: int) -> "LiftController":
-        """Return the controller of one case."""
         return LiftController(case, setup, chunk)
 
 
@@ -218,7 +211,6 @@ class LiftController(PouredController[LiftState]):
         self.phases["lift"] = Phase(self._lift, lift + 0.3)
 
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
-        """Lift the tube and vibrate the plate."""
         self.state.mass = float(view.masses[kept].astype(float).sum())
         self.state.surface = [0.0, self.state.observables["fill_height"]]
         self.state.first_impulse = view.impulse

@@ -1,8 +1,7 @@
 """Grains that rain into a container: places without overlap, found one grain after another on the device.
 
 In the frame that falls with the rain, grain i is at height i times speed over rate, at the first random place
-of the container's cross-section where it overlaps no earlier grain. In the world the whole rain falls at one
-speed; a grain is released to gravity when it crosses the release plane, so grains never overlap before.
+of the cross-section without overlap. A grain is released to gravity when it crosses the release plane.
 """
 
 from collections.abc import Sequence
@@ -49,19 +48,10 @@ def place_rain(
     spacings: Sequence[float],
     device: Any,
 ) -> list[Rain]:
-    """Return the rains of several independent worlds.
+    """Return the rains of several independent worlds; raise ValueError if one has no room.
 
-    Parameters
-    ----------
-    grains, seeds, sections
-        Grains in order of arrival, seed and container of each world.
-    spacings : sequence of float
-        Mean height between two grains of each world: speed over rate [m].
-
-    Raises
-    ------
-    ValueError
-        If a container is too narrow, or its rain too dense, for the grains.
+    Each world has its grains in order of arrival, a seed, the cross-section of its container, and a spacing:
+    the mean height between two grains, speed over rate [m].
     """
     # reading a scene's parameters does not load Warp's kernels
     import warp as wp

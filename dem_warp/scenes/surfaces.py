@@ -20,19 +20,8 @@ LEAST_POINTS = 3
 def column_tops(places: np.ndarray, heights: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the highest centre of each occupied square column.
 
-    Parameters
-    ----------
-    places, heights : (n, 2) and (n,) arrays
-        Centres [m].
-    side : float
-        Side of a column [m].
-
-    Returns
-    -------
-    columns : (k, 2) int array
-        Column [i, j] begins at i and j times `side`; in order of first appearance.
-    tops : (k,) array
-        Heights [m].
+    The `columns` (k, 2) begin at i and j times `side` [m], in order of first appearance; the `tops` (k,) are
+    the largest `heights` [m] of the centres at `places` (n, 2) [m] in them.
     """
     cells = np.floor(places / side).astype(int)
     i, j = (cells - cells.min(axis=0)).T
@@ -81,14 +70,8 @@ def flank_angle(x: np.ndarray, z: np.ndarray, reach: float) -> float | None:
     """Return the inclination of a flank [deg], or None if it is too low or too short.
 
     It is the slope of the least-squares line from the first to the last point within FLANK of the height. All
-    points between count: a choice by height alone would make the line flatter.
-
-    Parameters
-    ----------
-    x, z : (n,) arrays
-        Profile from one end of the flank to the other, x ascending [m].
-    reach : float
-        Bounding radius of a grain [m].
+    points between count: a choice by height alone would make the line flatter. The profile goes from one end
+    of the flank to the other, x ascending [m]; `reach` is the bounding radius of a grain [m].
     """
     if not len(z) or np.ptp(z) < LEAST_RISE * reach:
         return None

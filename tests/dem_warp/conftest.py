@@ -1,4 +1,4 @@
-"""Lets the tests of the engine import `worlds`, the builders of small worlds that lie beside them."""
+"""Path of the engine tests, so that they can import `worlds`, the builders of small worlds."""
 
 import sys
 from pathlib import Path

@@ -35,7 +35,7 @@ DIVERGING = replace(
     grain_grain=replace(small_case().grain_grain, restitution=1e-6),
     grain_wall=replace(small_case().grain_wall, restitution=1e-6),
 )
-"""At four times the usual step the explicit damping of almost plastic impacts overshoots."""
+"""With four times the usual step the explicit damping of almost plastic impacts overshoots."""
 
 ENDLESS = [small_case(seed, replace(SMALL_TUBE, duration=3600.0)) for seed in (1, 2)]
 """Cases that nobody sees the end of."""

@@ -11,7 +11,7 @@ from dem_warp.solver import Solver
 from dem_warp.walls import Motion, Plane
 
 SPEED = 1e-4
-"""Of the belt [m/s]: so slow that the contacts stick."""
+"""Speed of the belt [m/s]: so slow that the contacts stick."""
 
 BELT, STEPS = 0, 256
 

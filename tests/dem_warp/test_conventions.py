@@ -53,7 +53,7 @@ SPEED = 0.1
         (lambda: laws_named("ligghts"), r"laws: must be one of edem, .* got 'ligghts'"),
         (
             lambda: replace(small_case(), laws=RELATIVE, mechanisms=(ElasticPlasticRolling(),)),
-            r"ContactLaws.rolling: must be 'own_spin' beside the mechanism elastic_plastic_rolling, got",
+            r"ContactLaws.rolling: must be 'own_spin' with the mechanism elastic_plastic_rolling, got",
         ),
         (
             lambda: replace(small_case(), laws=laws_named("lammps"), mechanisms=(MicroSlip(),)),

@@ -108,7 +108,7 @@ def test_frames_are_spread_over_the_whole_case(filmed: tuple[CaseResult, Film]) 
     times = np.array([frame.time for frame in film.frames])
     assert (len(times), times[0]) == (COUNT, 0.0)
     assert times[-1] == pytest.approx(result.observables["simulated_time"], rel=1e-12)
-    # Chosen from four times as many and more, they stand at most a fourth beside an even spread, twice.
+    # Chosen from four times as many and more, they are at most a fourth off an even spread, twice.
     np.testing.assert_allclose(np.diff(times), times[-1] / (COUNT - 1), rtol=0.5)
     assert [frame.phase for frame in (film.frames[0], film.frames[-1])] == ["fill", "rest"]
 

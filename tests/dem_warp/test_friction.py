@@ -33,7 +33,7 @@ SPEED = 0.1
 
 
 def lever(contact: ContactCoefficients) -> float:
-    """From the centre of a resting ball to its contact point, half the overlap above the plane [m]."""
+    """Distance from the centre of a resting ball to its contact: half the overlap above the plane [m]."""
     return RADIUS - 0.5 * static_overlap(contact, ball_mass() * GRAVITY)
 
 

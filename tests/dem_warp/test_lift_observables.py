@@ -1,4 +1,4 @@
-"""Measurements of a lifted cylinder beside its heap: loads, the falling surface, where the mass lies."""
+"""Measurements of a lifted cylinder besides its heap: loads, the falling surface, the place of the mass."""
 
 import math
 from collections.abc import Callable

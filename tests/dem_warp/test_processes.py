@@ -30,7 +30,7 @@ class Signature:
 
 @dataclass(frozen=True)
 class Loss:
-    """Kills the process that simulates, the first so many times."""
+    """Kills the simulating process the first n times."""
 
     folder: Path
     times: int
@@ -98,10 +98,10 @@ def test_a_process_that_is_lost_between_two_calls_is_replaced_and_others_are_lef
 
 
 def test_each_call_tells_of_its_own_progress() -> None:
-    told: list[Progress] = []
+    seen: list[Progress] = []
     with Processes(2) as processes:
         for _ in range(2):
-            told.clear()
-            simulate(CASES, "cpu", processes, on_progress=told.append)
-            assert told[0].total == told[-1].done == len(CASES)
-            assert told[0].fraction < told[-1].fraction == 1.0
+            seen.clear()
+            simulate(CASES, "cpu", processes, on_progress=seen.append)
+            assert seen[0].total == seen[-1].done == len(CASES)
+            assert seen[0].fraction < seen[-1].fraction == 1.0

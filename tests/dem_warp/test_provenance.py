@@ -83,7 +83,7 @@ def test_the_fingerprint_covers_what_batches_laws_and_scenes_load() -> None:
 
 @pytest.fixture
 def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A law in a package from outside, whose number stands in a file beside it."""
+    """A law in a package from outside with its number in another file."""
     package = tmp_path / "someones_laws"
     package.mkdir()
     (package / "__init__.py").touch()

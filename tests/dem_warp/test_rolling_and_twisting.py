@@ -158,7 +158,7 @@ def spun_pair(contact: ContactCoefficients) -> tuple[np.ndarray, np.ndarray, Rec
 
 
 def moment_of_momentum(masses: np.ndarray, radii: np.ndarray, seen: Record) -> np.ndarray:
-    """Of all balls about the origin, step by step, (steps + 1, 3) [kg m2/s]."""
+    """Angular momentum of all balls about the origin, step by step, (steps + 1, 3) [kg m2/s]."""
     orbital = np.cross(seen.positions, seen.velocities) * masses[:, None]
     return (orbital + 0.4 * (masses * radii**2)[:, None] * seen.spins).sum(axis=1)
 

@@ -34,13 +34,13 @@ DEVICE = os.environ.get("DEM_WARP_TEST_DEVICE", "cpu")
 
 GRAVITY = 9.81
 RADIUS = 5e-3
-"""Of the single spheres [m]."""
+"""Radius of the single spheres [m]."""
 
 BALL = ClumpShape.sphere(RADIUS)
 GRAIN = Material(density=1000.0, shear_modulus=10e6, poisson_ratio=0.25)
 STEEL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.3)
 TIME_STEP = 0.25 * rayleigh_time(RADIUS, GRAIN)
-"""Of a ball on a plane [s]."""
+"""Time step of a ball on a plane [s]."""
 
 HERTZ_DURATION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
 """Duration of an elastic Hertz impact over (largest overlap / impact speed): 2.9432750."""
@@ -148,7 +148,7 @@ def downhill(degrees: float) -> tuple[float, float, float]:
 
 
 def ball_mass() -> float:
-    """Of a single sphere [kg]."""
+    """Mass of a single sphere [kg]."""
     return GRAIN.density * BALL.volume
 
 
@@ -313,9 +313,9 @@ def run_batch(cases: Sequence[Case]) -> dict[int, CaseResult]:
 
 def assert_measured_as_told(case: Case, result: CaseResult, absent: frozenset[str] = frozenset()) -> None:
     """A result has every observable that its scene tells of, but for some, and no other."""
-    told = set(case.scene.observables)
-    assert set(result.observables) == (told - absent) | {"rebuilds"}
-    assert absent <= told
+    declared = set(case.scene.observables)
+    assert set(result.observables) == (declared - absent) | {"rebuilds"}
+    assert absent <= declared
 
 
 def ball_case(scene: Scene, friction: float, rolling: float = 0.0, seed: int = 1) -> Case:

@@ -1,4 +1,4 @@
-"""The wheel of the tree; lets the tests import `installation`, which lies beside them."""
+"""The wheel of the tree, and the path of these tests, so that they can import `installation`."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Packages as a stranger has them: built, installed in a folder of their own, run without the tree beside."""
+"""Packages as a user has them: built, installed in a folder, run without the tree."""
 
 from __future__ import annotations
 

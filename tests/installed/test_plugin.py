@@ -66,7 +66,7 @@ JAR = '[scene.jar]\ndiameter = "12 mm"\nheight = "20 mm"\ngrain_count = 10\n'
 
 @pytest.fixture(scope="module")
 def plugged(installed: Installed, tmp_path_factory: pytest.TempPathFactory) -> Installed:
-    """The wheel of this tree, and the package from outside beside it."""
+    """The wheel of this tree, and the package from outside."""
     folder = tmp_path_factory.mktemp("plugin")
     wheel = build(TESTS / "plugin", ("pyproject.toml", "grain_magnets"), folder)
     pip("install", wheel, "--target", folder / "site")

@@ -1,4 +1,4 @@
-"""The wheel as a stranger installs it: the product, all that it needs when it runs, and no evidence."""
+"""The wheel as a user installs it: the product, all that it needs when it runs, and no evidence."""
 
 import tomllib
 import zipfile

@@ -9,7 +9,7 @@ import numpy as np
 from dem_warp import Case, CaseResult
 
 RADIUS, BASE = 0.5e-3, 20e-3
-"""Of a sphere, and of the cone [m]."""
+"""Radii of a sphere and of the cone [m]."""
 
 
 def simulate(cases: Sequence[Case], on_result: Any = None, **_: Any) -> list[CaseResult]:

@@ -20,7 +20,7 @@ class Magnetism(Mechanism):
     """Attraction of surfaces that touch."""
 
     magnetic_force: Annotated[float, Parameter("N", at_least=0.0)] = 0.0
-    """Of every contact."""
+    """Force of every contact."""
 
     name: ClassVar[str] = "magnetism"
     strength: ClassVar[str] = "magnetic_force"
