@@ -1,4 +1,4 @@
-"""The course of a bridge: runs around the card's point, runs around the corrected one, and fresh runs there.
+"""Steps of a bridge: runs around the card's point, runs around the corrected point, and fresh runs there.
 
 Half of the runs are placed around the card's point: on it, across the target's contour and along it. They
 shift and scale the surface, and the other half are placed alike around the point that the corrected surface
@@ -26,8 +26,8 @@ DEGREES_WITHIN = 0.5
 """Margin of a bridge between angles [deg]."""
 
 BEYOND = (1.0, 1.5, 2.0, 3.0)
-"""Boxes in which the corrected point is looked for, one after another, as parts of the reach of the card's
-runs. Beyond 1 the shape of the surface is extrapolated; the second half of the runs lies there too."""
+"""Boxes in which the corrected point is searched, one after another, relative to the reach of the card's
+runs. Beyond 1 the shape of the surface is extrapolated; the second half of the runs is there, too."""
 
 FRESH = 1000
 """Number of the first fresh run."""
@@ -37,7 +37,7 @@ Runner = Callable[[pd.DataFrame, str], pd.DataFrame]
 
 
 class _EndError(Exception):
-    """End of a bridge before its last step, foreseen."""
+    """A bridge ends before its last step."""
 
     def __init__(self, outcome: BridgeOutcome, reason: str) -> None:
         super().__init__(reason)
@@ -47,17 +47,14 @@ class _EndError(Exception):
 def check_order(source: Source, runs: int, fresh: int, margin: float | None) -> float:
     """Check the numbers of a bridge, and return its margin in the response's unit.
 
-    Raises
-    ------
-    InputError
-        With too few runs or fresh runs, or a margin that is not positive or must be stated.
+    Raise InputError with too few runs or fresh runs, or a margin that is not positive or must be stated.
     """
     if runs < LEAST_RUNS:
-        raise InputError("--runs", f"a bridge needs {LEAST_RUNS} runs or more", runs)
+        raise InputError("--runs", f"must be at least {LEAST_RUNS}", runs)
     if fresh < 2:
-        raise InputError("--fresh", "a mean with a spread needs 2 fresh runs or more", fresh)
+        raise InputError("--fresh", "must be at least 2", fresh)
     if margin is None and source.unit != "deg":
-        raise InputError("--margin", f"must be stated for a response in {source.unit}", "none")
+        raise InputError("--margin", f"must be given for a response in {source.unit}")
     margin = DEGREES_WITHIN if margin is None else margin
     if not (np.isfinite(margin) and margin > 0.0):
         raise InputError("--margin", "must be a positive number", margin)

@@ -1,4 +1,4 @@
-"""The card that a bridge starts from: its test with its factors free again, its surface, its target."""
+"""The card that a bridge starts from: its test, its free factors, its surface, its target."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from experiments.studyfile.card_surface import SURFACE, card_surfaces
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A card, taken apart."""
+    """Parts of a card."""
 
     path: Path
     card: dict[str, Any]
     study: Study
-    """Its own test; the factors that it chose vary as its surface does, all else has its values."""
+    """Its own test; the factors of its surface vary, all else has its values."""
     response: str
     """Name of the response that it was fitted to."""
     observable: str
@@ -37,26 +37,23 @@ class Source:
 def read_source(path: Path) -> Source:
     """Read the card of a bridge.
 
-    Raises
-    ------
-    StudyError
-        When the file is no card, a bridge has written it, it has no surface, or several responses were
-        matched together.
+    Raise StudyError when the file is not a card, a bridge has written it, it has no surface, or several
+    responses were matched together.
     """
     _, card = read_toml(path)
     own = load_card(path)
     if BRIDGE in card:
-        rule = "expected a bridge starts from a card that dem-warp calibrate wrote, not from one that is corrected"
-        raise StudyError(f"{path}: {BRIDGE}", rule, card[BRIDGE].get("engine", "a corrected one"))
+        hint = "Start from the card that dem-warp calibrate wrote."
+        raise StudyError(f"{path}: {BRIDGE}", "this card was already corrected by a bridge", hint=hint)
     surfaces = card_surfaces(card, path)
     if len(surfaces) != 1:
-        rule = "expected a bridge corrects the surface of one response, which the card has in [surface.NAME]"
-        raise StudyError(f"{path}: {SURFACE}", rule, ", ".join(surfaces) or "none")
+        problem = "a bridge needs a card with the surface of one response, [surface.NAME]"
+        raise StudyError(f"{path}: {SURFACE}", problem, ", ".join(surfaces) or "no surface")
     [(response, surface)] = surfaces.items()
     facts = card.get("fitted", {}).get("response", {}).get(response, {})
     if facts.get("scene", "target") != "target":
-        rule = "expected a bridge runs the card's own test, and its response is that of a further scene"
-        raise StudyError(f"{path}: fitted.response.{response}", rule, facts["scene"])
+        problem = "a bridge runs the card's own test, not a further scene"
+        raise StudyError(f"{path}: fitted.response.{response}", problem, facts["scene"])
     target, unit = _target(facts, f"{path}: fitted.response.{response}")
     chosen = {name: card["factor"][name]["chosen"] for name in surface.design.names}
     study = _with_factors(own, card, surface)
@@ -68,8 +65,8 @@ def _target(facts: dict[str, Any], place: str) -> tuple[Sample, str]:
         mean, sd = (Quantity.parse(facts[name]) for name in ("mean", "sd"))
         return Sample(mean.number, sd.number, facts["n"]), mean.unit or "1"
     except (DesignError, KeyError, ValueError) as error:
-        rule = "expected a card says what was measured: mean, sd and n, and of which observable"
-        raise StudyError(place, rule, f"{type(error).__name__}: {error}") from None
+        problem = "must have the mean, sd and n of what was measured, and its observable"
+        raise StudyError(place, problem, f"{type(error).__name__}: {error}") from None
 
 
 def _with_factors(study: Study, card: dict[str, Any], surface: Surface) -> Study:

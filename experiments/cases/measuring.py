@@ -1,4 +1,4 @@
-"""Processes that measure heaps while others simulate: measuring holds Python's lock."""
+"""Processes that measure heaps while others simulate, since measuring holds Python's lock."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _CONTEXT = multiprocessing.get_context("spawn")
 
 
 def measuring_processes(count: int, measure: Callable[..., object], cases: int) -> ProcessPoolExecutor:
-    """Start processes with this one's end as theirs, one thread each: there is one for every core.
+    """Start processes that end with this one, one thread each: there is one for every core.
 
-    Those for so many cases start at once, and load what ``measure`` needs while the cases are simulated.
+    Those for `cases` start at once, and load what `measure` needs while the cases are simulated.
     """
     pool = ProcessPoolExecutor(count, _CONTEXT, _begin, (measure,))
     for _ in range(min(count, cases)):
@@ -24,7 +24,7 @@ def measuring_processes(count: int, measure: Callable[..., object], cases: int) 
 
 
 def _begin(measure: Callable[..., object]) -> None:
-    """Limit the threads of all that has come with `measure`; what is loaded later is not limited."""
+    """Limit the threads of all that was loaded with `measure`; what is loaded later is not limited."""
     from threadpoolctl import threadpool_limits
 
     end_with_parent()
@@ -32,4 +32,4 @@ def _begin(measure: Callable[..., object]) -> None:
 
 
 def _nothing() -> None:
-    """Do nothing, in a process that has begun."""
+    """Start the process that runs this."""

@@ -8,67 +8,56 @@ from typing import Annotated
 
 import typer
 
-from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, messages
-from experiments.commands.options import AsJson, Cluster, Out, Resume, Scheduler
+from experiments.commands.console import FAILED_RUN, Attempt, clear_errors, messages
+from experiments.commands.options import AsJson, Live, options_of, with_request
+from experiments.live.server import live_page
+from experiments.runs.request import RunRequest
 
 BRIDGE_EXAMPLE = "Example: [bold]dem-warp bridge out/mygrain/material.toml --engine liggghts[/]"
 
 
+@with_request("scale", "device")
 def bridge(
     card: Annotated[Path, typer.Argument(metavar="CARD", help="Material card of dem-warp calibrate.")],
-    engine: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="The other solver: liggghts, lammps, yade, a plug-in."),
-    ] = None,
     command: Annotated[
         str | None,
-        typer.Option(help="Or the command of any program that keeps docs/engine.md."),
+        typer.Option(help="Command of the other solver, in place of --engine; it keeps docs/engine.md."),
     ] = None,
     runs: Annotated[int, typer.Option(help="Runs that the correction is made from, six or more.")] = 12,
     fresh: Annotated[int, typer.Option(help="Fresh runs that verify it.")] = 5,
     margin: Annotated[
         float | None,
-        typer.Option(help="Difference that does not matter, in the target's unit. Left out: 0.5 degrees."),
+        typer.Option(help="Difference that does not matter, in the target's unit. Default: 0.5 degrees."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Root of the seeds of all runs.")] = 1,
-    workers: Annotated[int | None, typer.Option(min=1, help="Runs at once. Left out: one a core.")] = None,
-    scheduler: Scheduler = None,
-    cluster: Cluster = None,
     time_limit: Annotated[
-        str | None, typer.Option(help='Wall time of a run, as "10 min". Left out: none.')
+        str | None, typer.Option(help='Wall time of a run, e.g. "10 min". Default: no limit.')
     ] = None,
     approximate: Annotated[
         bool, typer.Option("--approximate", help="Take the nearest for what the other code lacks.")
     ] = False,
-    out: Out = None,
-    resume: Resume = False,
+    live: Live = False,
     as_json: AsJson = False,
+    *,
+    asked: RunRequest,
 ) -> None:
     """Correct a card for another solver: a few runs there shift and scale its surface, fresh ones verify."""
     with clear_errors():
-        from experiments import api
+        from experiments.runs.bridging import BridgeOrder, prepare_bridge, run_bridge
 
-        ended = api.bridge(
-            card,
-            out,
-            engine=engine,
-            command=command,
-            runs=runs,
-            fresh=fresh,
-            margin=margin,
-            seed=seed,
-            workers=workers,
-            scheduler=scheduler,
-            cluster=cluster,
-            time_limit=time_limit,
+        order = BridgeOrder(
+            command=command, runs=runs, fresh=fresh, margin=margin, seed=seed, time_limit=time_limit,
             approximate=approximate,
-            resume=resume,
-            watch=CaseProgress,
-        )
+        )  # fmt: skip
+        prepared = prepare_bridge(card, asked, order)
+    options = options_of(prepared.run) | vars(order) | {"engine": asked.engine, "scale": None}
+    advice = Attempt.of("bridge", card, **options, live=live, json=as_json)
+    with clear_errors(advice), live_page(prepared.run.folder, live, messages.print):
+        ended = run_bridge(prepared)
     if as_json:
         typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
     for sentence in ended.crossing.sentences():
         messages.print(sentence)
     messages.print(f"Card: {ended.card}" if ended.card else f"Files: {ended.folder}")
-    if ended.crossing.outcome == "too-many-failed-runs":
+    if ended.failed:
         raise typer.Exit(FAILED_RUN)

@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 from rich.text import Text
 
-from experiments.journal.progress import duration, time_left
+from experiments.io.time_left import duration, time_left
 
 if TYPE_CHECKING:
     from dem_warp import Progress as BatchProgress
@@ -31,33 +31,33 @@ if TYPE_CHECKING:
 BAD_INPUT, FAILED_RUN, INTERRUPTED, TERMINATED = 2, 1, 130, 143
 """Exit codes."""
 
-ENDED_OUTSIDE = "a process was ended from outside, perhaps for lack of memory: fewer --workers need less."
+ENDED_OUTSIDE = "a process was ended from outside, perhaps for lack of memory: use fewer --workers."
 
 QUIET_START = 2.0
-"""Least duration that shows progress [s]."""
+"""Shortest duration that shows progress [s]."""
 MANIFEST = "study.json"
-"""File of a folder that a run can go on in; `experiments.studyfile.manifest` writes it."""
+"""File of a folder that a run can be continued in; `experiments.studyfile.manifest` writes it."""
 
 LINE_EVERY = 10.0
-"""Time between two lines of progress where there is no terminal [s]."""
+"""Time between two lines of progress without a terminal [s]."""
 
 HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
-"""Kinds of characters that steer a terminal or the order of its text."""
+"""Categories of characters that control a terminal or the order of its text."""
 
 WAYS_OUT = {
     errno.ENOSPC: "free some room on the disk",
     errno.EDQUOT: "free some room in your quota",
-    errno.EACCES: "see to the permissions, close the program that has it open, or name another place",
-    errno.EPERM: "see to the permissions, or name another place",
-    errno.EROFS: "name a place that can be written to",
+    errno.EACCES: "check the permissions, close the program that has it open, or choose another place",
+    errno.EPERM: "check the permissions, or choose another place",
+    errno.EROFS: "choose a place that can be written to",
     errno.ENAMETOOLONG: "choose a shorter name",
-    errno.ENOENT: "see to it that nothing is moved or removed while a command runs",
+    errno.ENOENT: "check that nothing is moved or removed while a command runs",
 }
-"""Advice for errors of the system by their number."""
+"""Advice about errors of the system, by their number."""
 
 
 def plain(text: str) -> str:
-    """Return text in which characters that steer a terminal stand as their escapes, ``\\x1b`` for one."""
+    """Return text in which characters that control a terminal are escaped, e.g. as ``x1b``."""
     return "".join(
         character if character in "\n\t" or category(character) not in HIDDEN
         else character.encode("unicode_escape", "surrogatepass").decode()
@@ -66,15 +66,15 @@ def plain(text: str) -> str:
 
 
 def shell_line(words: Sequence[str]) -> str:
-    """Join the words of a command as the system's shell reads them."""
+    """Join the words of a command for the system's shell."""
     return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)
 
 
 class Messages(Console):
-    """Console of a person's messages: text is shown as it is, without markup."""
+    """Console of messages; text is shown without markup."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Show texts plainly, and whatever Rich draws."""
+        """Show texts plainly, and renderables of Rich."""
         shown = (plain(each) if isinstance(each, str) else each for each in objects)
         super().print(*shown, **({"markup": False} | options))
 
@@ -89,12 +89,12 @@ class _PlainFormatter(logging.Formatter):
 
 
 class Terminated(KeyboardInterrupt):
-    """The command was told to end by SIGTERM, as schedulers do."""
+    """The command received SIGTERM, e.g. from a scheduler."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """A command that leaves a folder which it can go on in."""
+    """A command whose run can be continued in its folder."""
 
     command: str
     """The command with all its options, quoted."""
@@ -102,11 +102,8 @@ class Attempt:
     """Its folder."""
 
     @classmethod
-    def of(cls, command: str, *files: Path | None, out: Path, **options: object) -> Attempt:
-        """Write a command with its files and options: a list's once for each of its values.
-
-        Those that were not given are left out.
-        """
+    def of(cls, command: str, /, *files: Path | None, out: Path, **options: object) -> Attempt:
+        """Write a command with its files and the options that were given; a list repeats its option."""
         words = ["dem-warp", command, *(str(file) for file in files if file)]
         for name, given in {"out": out, **options}.items():
             for value in given if isinstance(given, list) else [given]:
@@ -115,7 +112,7 @@ class Attempt:
         return cls(shell_line(words), out)
 
     def __str__(self) -> str:
-        """Say how to go on."""
+        """Advice on how to continue."""
         # pathlib raises where a name is too long for the system
         begun = os.path.isfile(self.folder / MANIFEST)
         return f"Resume with: {self.command} --resume" if begun else f"Begin again with: {self.command}"
@@ -123,11 +120,11 @@ class Attempt:
 
 @contextmanager
 def clear_errors(advice: object = "") -> Iterator[None]:
-    """Turn errors into a message and an exit code, with the advice how to go on as it then reads.
+    """Turn errors into a message, with advice on how to continue, and an exit code.
 
     2 is for bad input, 1 for a run that the machine ended, 130 for Ctrl-C, 143 for SIGTERM.
     """
-    # SIGTERM first: the libraries take their time
+    # SIGTERM first, since the libraries take time to load
     with _ended_by_sigterm():
         handler = logging.StreamHandler()
         handler.setFormatter(_PlainFormatter("%(message)s"))
@@ -144,10 +141,10 @@ def clear_errors(advice: object = "") -> Iterator[None]:
             what = str(error) if _are_lost_workers(error) else ENDED_OUTSIDE
             fail(f"{what} {advice}", FAILED_RUN)
         except MemoryError:
-            fail(f"there is not enough memory: fewer --workers need less. {advice}", FAILED_RUN)
+            fail(f"there is not enough memory: use fewer --workers. {advice}", FAILED_RUN)
         except OSError as error:
             place = f"{error.filename}: " if error.filename is not None else ""
-            way_out = WAYS_OUT.get(error.errno or 0, "see to the file, or name another")
+            way_out = WAYS_OUT.get(error.errno or 0, "check the file, or choose another")
             fail(f"{place}{error.strerror or error}: {way_out}. {advice}", FAILED_RUN)
         except ValueError as error:
             if not _is_input(error):
@@ -157,7 +154,7 @@ def clear_errors(advice: object = "") -> Iterator[None]:
 
 @contextmanager
 def _ended_by_sigterm() -> Iterator[None]:
-    """Let SIGTERM raise `Terminated`, where signals are received."""
+    """Let SIGTERM raise `Terminated`, in the thread that receives signals."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -173,26 +170,26 @@ def _ended_by_sigterm() -> Iterator[None]:
 
 
 def _is_input(error: ValueError) -> bool:
-    """Tell that an error is of the input: those of libraries that were never loaded cannot be."""
+    """True if an error is one of bad input, of the libraries that are loaded."""
     kinds = [("experiments.io.errors", "InputError"), ("imaging", "PictureError"), ("doe", "DesignError")]
     loaded = (getattr(sys.modules.get(module), name, ()) for module, name in kinds)
     return isinstance(error, tuple(kind for kind in loaded if kind))
 
 
 def _are_lost_workers(error: BrokenExecutor) -> bool:
-    """Tell that an error says which workers were lost."""
+    """True if an error is one of lost workers."""
     module = sys.modules.get("experiments.cases.workers.workers")
     return module is not None and isinstance(error, module.WorkersLostError)
 
 
 def fail(message: str, code: int = BAD_INPUT) -> NoReturn:
-    """Say what is wrong and end the command by typer.Exit."""
+    """Print what is wrong, and end the command by typer.Exit."""
     messages.print(Text.assemble(("Error:", "bold red"), " ", plain(message)))
     raise typer.Exit(code)
 
 
 class CaseProgress:
-    """Shows how far a batch of cases is: a bar on a terminal, a line now and then elsewhere."""
+    """Shows the progress of a batch of cases: a bar on a terminal, a line now and then elsewhere."""
 
     def __init__(self, title: str) -> None:
         self._title = title
@@ -231,9 +228,9 @@ class CaseProgress:
 
 
 def describe_progress(progress: BatchProgress, first: BatchProgress | None = None) -> str:
-    """Say how long it will take and what runs, as ``1 min 20 s left, 3 of 12 cases, 2 lift``.
+    """Describe the time left and what runs, e.g. ``1 min 20 s left, 3 of 12 cases, 2 lift``.
 
-    The speed is that since the `first` progress, see `time_left`.
+    See `time_left` for the `first` progress.
     """
     parts = [f"{progress.done} of {progress.total} cases"]
     parts += [f"{count} {phase}" for phase, count in progress.phase_counts.items() if phase != "waiting"]

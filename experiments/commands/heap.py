@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.commands.console import FAILED_RUN, Attempt, CaseProgress, clear_errors, fail, messages
-from experiments.commands.early import check_heap_file
+from experiments.commands.console import FAILED_RUN, Attempt, clear_errors, fail, messages
 from experiments.commands.options import (
     AsJson,
-    Cluster,
-    Device,
     DryRun,
-    EngineName,
     Live,
-    Out,
-    Scale,
-    Scheduler,
     StudyFile,
     assignments,
+    options_of,
+    with_request,
 )
 from experiments.commands.plans import show_plan
 from experiments.commands.results import print_measured, print_narrowness
 from experiments.live.server import live_page
+from experiments.runs.request import RunRequest
 
 if TYPE_CHECKING:
     from experiments.cases import Heap
@@ -50,6 +48,7 @@ Frames = Annotated[
 ]
 
 
+@with_request("workers")
 def heap(
     study: StudyFile = None,
     settings: Settings = None,
@@ -57,17 +56,13 @@ def heap(
     scene: Scene = None,
     frames: Frames = None,
     movie: Annotated[
-        str | None, typer.Option(metavar="KIND", help="Film of the frames: gif, mp4 or none. Left out: gif.")
+        str | None, typer.Option(metavar="KIND", help="Film of the frames: gif, mp4 or none. Default: gif.")
     ] = None,
-    out: Out = None,
-    scale: Scale = None,
-    device: Device = None,
-    scheduler: Scheduler = None,
-    cluster: Cluster = None,
-    engine: EngineName = None,
     dry_run: DryRun = False,
     live: Live = False,
     as_json: AsJson = False,
+    *,
+    asked: RunRequest,
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView, OVITO), angle.json, and snapshot.png with the fitted flanks.
 
@@ -76,52 +71,33 @@ def heap(
     scene of the study.
     """
     with clear_errors():
-        check_heap_file(study, scale, engine, scene)
-        from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
-        from experiments.cases.show.heap import filmed_by
+        from experiments.runs.choices import check_scene, prepare
+
+        what = f"{scene or 'heap'}-{seed}"
+        prepared = prepare(study, replace(asked, workers=1), partial(check_scene, scene=scene), what)
         from experiments.cases.show.movie import MOVIES, require_movie
-        from experiments.cases.workers.own import watched_by
-        from experiments.io.files import require_folder
-        from experiments.journal.journal import Journal
-        from experiments.runs.campaign import watching
-        from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
-        from experiments.studyfile.campaign import TARGET_SCENE
+        from experiments.runs.one_heap import HeapOrder, run_heap
 
         require_movie(movie, frames)
-        resources, place = chosen_resources(device, 1, scheduler, cluster), scene or TARGET_SCENE
-        chosen = with_engine(chosen_study(study, scale, resources), engine)
-        values = chosen.natural_settings(assignments(settings or []), "--set")
-        folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
-        resources = resources_for(chosen, resources)
-        case = chosen.case(values, seed, place)  # what it refuses is refused before anything is written
+        values = prepared.study.natural_settings(assignments(settings or []), "--set")
+        order = HeapOrder(values, seed, scene, frames, movie or MOVIES[0])
+        case = order.case(prepared.study)  # what it refuses is refused before anything is written
         if dry_run:
             from experiments.runs.plan import plan_heap
 
-            show_plan(plan_heap(chosen, resources, case), as_json)
-    go_on = Attempt.of(
-        "heap", study, out=folder, set=settings, seed=seed, scene=scene, frames=frames, movie=movie,
-        scale=chosen.scale, device=device, scheduler=scheduler, cluster=cluster, engine=engine, live=live,
-        json=as_json,
+            show_plan(plan_heap(prepared, case), as_json)
+    advice = Attempt.of(
+        "heap", study, **options_of(prepared) | {"workers": None}, set=settings, seed=seed, scene=scene,
+        frames=frames, movie=movie, live=live, json=as_json,
     )  # fmt: skip
-    with clear_errors(go_on):
-        require_unused(folder)
-        require_folder(folder)
-        print_narrowness(chosen)
-        with live_page(folder, live, messages.print), open_workers(resources) as crew:
-            if frames is not None:
-                filmed_by(chosen, crew)
-            with (
-                Journal(folder, "heap", chosen, device=str(crew.described.get("device", ""))) as notes,
-                watching(scene or "heap", CaseProgress, notes) as progress,
-            ):
-                crew = watched_by(crew, notes.glimpses)
-                simulated = simulate_heap(chosen, values, seed, crew, progress, place, frames)
-                write_heap(simulated, folder, movie or MOVIES[0])
-    _tell_heap(simulated, folder, as_json)
+    with clear_errors(advice), live_page(prepared.folder, live, messages.print):
+        print_narrowness(prepared.study)
+        simulated = run_heap(prepared, order)
+    _print_heap(simulated, prepared.folder, as_json)
 
 
-def _tell_heap(simulated: Heap, folder: Path, as_json: bool) -> None:
-    """Say where the files are, and what was measured; a case that failed ends the command."""
+def _print_heap(simulated: Heap, folder: Path, as_json: bool) -> None:
+    """Print where the files are and what was measured; a case that failed ends the command."""
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
     messages.print(f"Files: {folder}")

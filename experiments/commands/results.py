@@ -14,9 +14,9 @@ from rich.text import Text
 from experiments.commands.console import messages, plain
 
 if TYPE_CHECKING:
-    from experiments.calibrate.results import StageResult
     from experiments.cases import Heap, Resources
     from experiments.grains.clumps.clump_search import Trial
+    from experiments.runs.calibration import StageResult
     from experiments.studyfile import Study
 
 

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
-from dem_warp import Case, CaseResult, Progress
+from dem_warp import Case, CaseResult
+from dem_warp.result import OnProgress
 from doe.discrepancy import Outcomes, Point
 from experiments.cases import Engine, Workers, engine_of
 from experiments.cases.engines.key import case_key
-from experiments.cases.store.outcome_table import OutcomeTable
+from experiments.cases.execute import CaseRunner
+from experiments.cases.store.outcome_table import Outcome, OutcomeTable
 from experiments.cases.workers.own import THIS_MACHINE
-from experiments.discover.wave import WaveRunner
 from experiments.io.errors import StudyError
+from experiments.measurement.case_observables import measure
 from experiments.studyfile import Study
 from experiments.studyfile.mechanism_factor import MechanismFactor, with_mechanisms
 from experiments.studyfile.observables import BY_NAME, VERSION
+from experiments.studyfile.study import MeasurementSection
 
 
 class EngineSimulator:
     """Answers points of a study with the observables of its test, simulated by the study's engine.
 
-    All points of a call are simulated as one wave; they are measured in processes of their
+    All points of a call are simulated as one batch; they are measured in processes of their
     own while the next are simulated, and kept. A point whose case a study refuses has that as its reason.
 
     Use it as a context, or call `close`, to end its processes.
@@ -35,9 +38,9 @@ class EngineSimulator:
     library
         Mechanisms that points may name, from its `library_for`.
     table
-        Where outcomes are kept; what is there already is not simulated again.
-    workers, progress
-        As of `WaveRunner`, a wave being all points of a call that are not kept yet.
+        Table that keeps outcomes; what is there already is not simulated again.
+    workers
+        Workers that simulate.
     engine
         Simulates in the place of the study's engine.
 
@@ -53,7 +56,6 @@ class EngineSimulator:
         library: Sequence[MechanismFactor],
         table: OutcomeTable,
         workers: Workers = THIS_MACHINE,
-        progress: Callable[[Progress], None] | None = None,
         engine: Engine | None = None,
     ) -> None:
         self.study, self.table, self.engine = study, table, engine or engine_of(study)
@@ -62,7 +64,8 @@ class EngineSimulator:
         seen = [name for name in names if name in BY_NAME and BY_NAME[name].by_photograph]
         self.observables = tuple(name for name in names if name in (*seen, *reported))
         """Names of what it answers with."""
-        self._runner = WaveRunner(study.measurement, table, workers, progress, self.engine, self.observables)
+        self._workers = workers
+        self._runner = CaseRunner(table, _measured, workers, self.engine)
         self._library = {mechanism.name: mechanism for mechanism in library}
         self._factors = [factor.name for factor in study.factors]
         self._conditions = [condition.name for condition in study.conditions]
@@ -78,8 +81,8 @@ class EngineSimulator:
         """End its processes."""
         self._runner.close()
 
-    def __call__(self, points: Sequence[Point]) -> Outcomes:
-        """Observables of every point, in order.
+    def __call__(self, points: Sequence[Point], progress: OnProgress | None = None) -> Outcomes:
+        """Return the observables of every point, in order; `progress` is called with the progress.
 
         Raises
         ------
@@ -97,7 +100,8 @@ class EngineSimulator:
                 keys.append(f"refused: {error}")
                 refused[keys[-1]] = (np.full(len(self.observables), np.nan), error.problem)
         found = self.table.load(list(cases)) | refused
-        found |= self._runner.run({key: case for key, case in cases.items() if key not in found})
+        missing = {key: case for key, case in cases.items() if key not in found}
+        found |= self._runner.run(missing, lambda key: (self.study.measurement, self.observables), progress)
         values = np.array([found[key][0] for key in keys]).reshape(len(keys), len(self.observables))
         return Outcomes(values, tuple(found[key][1] for key in keys))
 
@@ -109,7 +113,7 @@ class EngineSimulator:
         StudyError, ValueError
             As by `case`.
         """
-        return self._runner.heaps([self.case(point) for point in points])
+        return self._workers.simulate([self.case(point) for point in points], self.engine)
 
     def case(self, point: Point) -> Case:
         """Build the case of a point.
@@ -141,3 +145,7 @@ class EngineSimulator:
     def _extend(self, names: tuple[str, ...], condition: str) -> Study:
         mechanisms = [self._library[name] for name in names]
         return with_mechanisms(self.study, mechanisms).under(condition)
+
+
+def _measured(result: CaseResult, settings: MeasurementSection, names: tuple[str, ...]) -> Outcome:
+    return measure(settings, result, names)

@@ -13,6 +13,9 @@ from pathlib import Path
 
 from experiments.io.errors import InputError
 
+LOCK, JOURNAL = ".lock", ".live"
+"""File that a run locks while it works in a folder, and folder of its journal: neither is a result."""
+
 DEVICES = {"con", "prn", "aux", "nul", *(f"{kind}{n}" for kind in ("com", "lpt") for n in range(1, 10))}
 """Names that Windows keeps for devices, whatever their ending."""
 

@@ -1,7 +1,7 @@
 """The journal of a run: its progress, log, cases and stages, in files that are whole whenever they are read.
 
-It lies in the folder `JOURNAL` of the run's own, and is no result: nothing that a run finds depends on it,
-and the run goes on where it cannot be written.
+It is in the folder `JOURNAL` of the run's folder. No result depends on it: a run continues if it cannot be
+written.
 """
 
 from __future__ import annotations
@@ -18,24 +18,21 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from experiments.calibrate.results import TargetResult
-from experiments.cases.store.folder import JOURNAL
 from experiments.io.errors import StudyError
+from experiments.io.files import JOURNAL
 from experiments.io.plain_data import indexed, jsonable
-from experiments.journal.glimpses import Glimpses, prune
-from experiments.journal.progress import time_left
+from experiments.io.time_left import time_left
+from experiments.journal.previews import Previews, prune
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from dem_warp import Progress
-    from experiments.calibrate.results import StageResult
-    from experiments.studyfile import Study
 
 RUN, PROGRESS, LOG, CASES, STAGES = "run.json", "progress.json", "log.jsonl", "cases.jsonl", "stages.jsonl"
-BEAT, GLIMPSES = "beat", "glimpses"
-"""Files of a journal: the run, how far it is, and, a line each, what was said, the cases, the stages that
-have ended; a file whose time says when the run was last alive; the folder of glimpses."""
+BEAT, PREVIEWS = "beat", "previews"
+"""Files of a journal: the run, its progress, and, a line each, the log, the cases, the finished stages; a
+file whose time is the last sign of life of the run; the folder of previews."""
 
 FORMAT = 1
 """Version of the files."""
@@ -50,23 +47,23 @@ _log = logging.getLogger(__name__)
 
 
 class Journal:
-    """Notes what a run does, from any of its threads; to be used as a context.
+    """Notes of a run, from any of its threads; a context.
 
     Parameters
     ----------
     folder
         Folder of the run.
     command
-        Command that runs: ``calibrate``, ``discover`` or ``heap``.
+        Command of the run, e.g. ``calibrate``.
     study
-        Study that it runs for.
+        Study of the run.
     resume
-        Go on with the notes of an earlier run; without it, they are removed.
+        Continue the notes of an earlier run, which are removed otherwise.
     """
 
-    def __init__(self, folder: Path, command: str, study: Study, resume: bool = False, **facts: Any) -> None:
+    def __init__(self, folder: Path, command: str, study: Any, resume: bool = False, **facts: Any) -> None:
         self.folder = folder / JOURNAL
-        self.glimpses = Glimpses(self.folder / GLIMPSES)
+        self.previews = Previews(self.folder / PREVIEWS)
         """Callback after each advance of the run's batches."""
         self._run = {
             "format": FORMAT,
@@ -98,7 +95,7 @@ class Journal:
         logging.getLogger("experiments").addHandler(self._handler)
         logging.getLogger("dem_warp").addHandler(self._handler)
         threading.Thread(target=self._live, daemon=True).start()
-        self.say("The run begins." if not self._resume else "The run goes on.")
+        self.say("The run begins." if not self._resume else "The run continues.")
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
@@ -116,7 +113,7 @@ class Journal:
             self._progress |= {"state": state, "message": message, "left": None, "phases": {}}
             self._note_progress()
 
-    # ---- what a run tells ----------------------------------------------------------------------------------
+    # ---- notes ---------------------------------------------------------------------------------------------
 
     def say(self, text: str, level: str = "info") -> None:
         """Note a line of the log."""
@@ -139,21 +136,32 @@ class Journal:
         self._add(CASES, *({"name": name, **row} for name, row in zip(names, rows, strict=True)))
 
     def ended(self, key: str, outcome: Mapping[str, Any]) -> None:
-        """Note what a case gave; its heap is stored, and needs no glimpse any more."""
+        """Note what a case gave; its heap is stored, so that its preview is removed."""
         self._add(CASES, {"case_key": key, **jsonable(dict(outcome))})
         if name := self._names.pop(key, ""):
             with self._forgiving():
-                (self.glimpses.folder / f"{name}.npz").unlink(missing_ok=True)
+                (self.previews.folder / f"{name}.npz").unlink(missing_ok=True)
 
-    def stage(self, name: str, result: StageResult) -> None:
-        """Note what a stage decided, and its tables."""
-        for decision in result.decisions:
+    def stage(
+        self,
+        name: str,
+        decisions: Sequence[Any],
+        tables: Mapping[str, pd.DataFrame],
+        responses: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Note the decisions and tables of a stage; `responses` are those that it wants matched."""
+        for decision in decisions:
             self.say(f"{name.replace('_', ' ')}: {decision.outcome}")
-        tables = {title: json.loads(indexed(frame).to_json(orient="split", index=False))
-                  for title, frame in result.tables().items()}  # fmt: skip
-        noted = {"name": name, "decisions": jsonable(list(result.decisions)), "tables": tables}
-        if isinstance(result, TargetResult):
-            noted["responses"] = jsonable(result.responses)
+        texts = {
+            title: indexed(frame).to_json(orient="split", index=False) for title, frame in tables.items()
+        }
+        noted = {
+            "name": name,
+            "decisions": jsonable(list(decisions)),
+            "tables": {title: json.loads(text) for title, text in texts.items()},
+        }
+        if responses is not None:
+            noted["responses"] = jsonable(dict(responses))
         self._add(STAGES, noted)
 
     # ---- files ---------------------------------------------------------------------------------------------
@@ -168,7 +176,7 @@ class Journal:
         with self._lock:
             self._noted = time.monotonic()
             _replace(self.folder / PROGRESS, {**self._progress, "time": time.time()})
-        prune(self.glimpses.folder)
+        prune(self.previews.folder)
 
     def _add(self, name: str, *rows: Mapping[str, Any]) -> None:
         text = "".join(json.dumps(row, allow_nan=False, default=str) + "\n" for row in rows)
@@ -182,7 +190,7 @@ class Journal:
 
     @contextmanager
     def _forgiving(self) -> Iterator[None]:
-        """Let a run go on whose notes cannot be written."""
+        """Let a run continue if its notes cannot be written."""
         with contextlib.suppress(OSError):
             yield
 
@@ -195,7 +203,7 @@ class _Listener:
         self._first: Progress | None = None
 
     def __call__(self, progress: Progress) -> None:
-        """Note it, if the last note is old enough."""
+        """Note the progress, if the last note is old enough."""
         self._first = self._first or progress
         if time.monotonic() - self._journal._noted < NOTE_EVERY and progress.done < progress.total:
             return
@@ -220,8 +228,8 @@ class _Handler(logging.Handler):
         self._journal.say(record.getMessage(), record.levelname.lower())
 
 
-def _responses(study: Study) -> list[dict[str, Any]]:
-    """Numbers that a study wants matched; none where it simulates only, or they are still to be measured."""
+def _responses(study: Any) -> list[dict[str, Any]]:
+    """Describe the targets of a study; empty without targets, or if they are not measured yet."""
     try:
         return jsonable(list(study.target.responses))
     except StudyError:

@@ -1,4 +1,4 @@
-"""Heaps as the page draws them: the spheres of a glimpse, of a stored case or of a heap's file."""
+"""Heaps as the page draws them: the spheres of a preview, of a stored case or of a heap's file."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.cases.store.folder import CASES, JOURNAL
+from experiments.cases.store.folder import CASES
 from experiments.io.errors import InputError
-from experiments.journal.glimpses import read_glimpse, spheres_of
-from experiments.journal.journal import GLIMPSES
+from experiments.io.files import JOURNAL
+from experiments.journal.journal import PREVIEWS
+from experiments.journal.previews import read_preview, spheres_of
 from experiments.live.folder import inside
 
 MOST_SPHERES = 60_000
@@ -37,9 +38,9 @@ def heap_spheres(folder: Path, name: str) -> tuple[np.ndarray, str, float]:
     kind, _, key = name.partition("/")
     if name == "heap":
         return _few(_heap_file(inside(folder, "heap.vtp"))), "finished", 1.0
-    if kind not in ("glimpse", "case") or not _NAME.fullmatch(key):
+    if kind not in ("preview", "case") or not _NAME.fullmatch(key):
         raise InputError(str(folder), "must be the name of a heap", name)
-    path = inside(folder, f"{JOURNAL}/{GLIMPSES}/{key}.npz" if kind == "glimpse" else f"{CASES}/{key}.npz")
+    path = inside(folder, f"{JOURNAL}/{PREVIEWS}/{key}.npz" if kind == "preview" else f"{CASES}/{key}.npz")
     if kind == "case":
         # the simulator's classes take a second to import
         from experiments.cases import Store
@@ -47,7 +48,7 @@ def heap_spheres(folder: Path, name: str) -> tuple[np.ndarray, str, float]:
         result = Store(path.parent).load(key)
         return _few(spheres_of(result)), result.status, 1.0
     try:
-        spheres, facts = read_glimpse(path)
+        spheres, facts = read_preview(path)
     except ValueError as error:
         raise InputError(str(path), str(error), "another file") from None
     return _few(spheres), facts["phase"], facts["fraction"]

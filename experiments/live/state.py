@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from experiments.cases.store.folder import CASES as STORE
-from experiments.cases.store.folder import JOURNAL
-from experiments.journal.journal import BEAT, CASES, GLIMPSES, LOG, PROGRESS, RUN, STAGES
-from experiments.journal.progress import duration
+from experiments.io.files import JOURNAL
+from experiments.io.time_left import duration
+from experiments.journal.journal import BEAT, CASES, LOG, PREVIEWS, PROGRESS, RUN, STAGES
 from experiments.live.folder import changed, inside, matching, read_json, read_lines, read_table
 from experiments.live.notes import (
     DecisionNote,
@@ -152,9 +152,9 @@ def _heaps(folder: Path, cases: Mapping[str, Mapping[str, Value]]) -> list[dict[
 def _forming(folder: Path, cases: Mapping[str, Mapping[str, Value]]) -> list[dict[str, Value]]:
     """Heaps that form now, the newest first."""
     by_name = {case["name"]: case for case in cases.values() if "name" in case}
-    files = matching(folder / JOURNAL / GLIMPSES, "*.npz")
+    files = matching(folder / JOURNAL / PREVIEWS, "*.npz")
     return [
-        {"id": f"glimpse/{path.stem}", "title": title_of(by_name.get(path.stem, {})), "at_rest": False}
+        {"id": f"preview/{path.stem}", "title": title_of(by_name.get(path.stem, {})), "at_rest": False}
         for path in files[:HEAPS_SHOWN]
     ]
 

@@ -96,7 +96,7 @@ def watch_routes(folder_of: FolderOf, base: str = "/{token}") -> list[Route]:
         try:
             found = await run_in_threadpool(heap_spheres, folder, request.path_params["id"])
         except InputError:
-            return Response(status_code=204)  # the glimpse of a case that has just ended is gone
+            return Response(status_code=204)  # the preview of a case that has just ended is gone
         spheres, phase, fraction = found
         headers = {"X-Phase": phase.encode("ascii", "replace").decode(), "X-Fraction": f"{fraction:.4f}"}
         return Response(spheres.tobytes(), media_type="application/octet-stream", headers=headers)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from experiments.calibrate.results import Campaign
 from experiments.io.errors import StudyError
@@ -25,18 +25,8 @@ if TYPE_CHECKING:
 STUDIES = Path(__file__).parents[1] / "studies"
 
 
-Replay = Any
-
-
 class Companion:
     """Knowledge that a study brings besides its file; subclasses override what they have."""
-
-    def planned_runs(self, replicates: int) -> dict[str, Any]:
-        """Return no runs: those of the paper belong to the evidence."""
-        return {}
-
-    def replay(self, cases: object) -> None:
-        """Return None."""
 
     def campaign_chapters(self, campaign: Campaign) -> Sequence[Chapter]:
         """Return the chapters that close the report of a campaign."""

@@ -1,4 +1,4 @@
-"""An examination of the machine: what it has, what works, and what a run would use."""
+"""An examination of the machine: its parts, what works, and what a run would use."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ from experiments.cases.forecast.speed import UNKNOWN, Speed, noted_speed
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.submissions import submit_command
 from experiments.io.program_version import program_version
-from experiments.runs.choices import chosen_study
+from experiments.runs.choices import BENCH, PAPER
+from experiments.studyfile import load_study
 from imaging.drawing.opengl import opengl_works
 
 GPU_WORLDS = 32
@@ -38,13 +39,13 @@ GPU_WORLDS = 32
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at."""
+    """Result of one check."""
 
     name: str
     good: bool
     text: str
     needed: bool = False
-    """True of what no case can be simulated without."""
+    """True if no case can be simulated without it."""
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as JSON-able data."""
@@ -52,7 +53,7 @@ class Finding:
 
 
 def examine(resources: Resources) -> list[Finding]:
-    """Look at everything that simulates or draws, and try both on a small heap."""
+    """Check everything that simulates or draws, and try both on a small heap."""
     resolve_device(None)
     versions = f"dem-warp {program_version()}, Warp {wp.__version__}, Python {platform.python_version()}"
     speed = noted_speed(resources.machine)
@@ -77,7 +78,7 @@ def _used(resources: Resources) -> str:
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Count the cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -105,12 +106,12 @@ def _memory() -> Finding:
         page = os.sysconf("SC_PAGE_SIZE")
         there, free = (page * os.sysconf(name) / 1e9 for name in ("SC_PHYS_PAGES", "SC_AVPHYS_PAGES"))
     except (AttributeError, ValueError, OSError):
-        return Finding("memory", True, "this system does not tell")
+        return Finding("memory", True, "unknown on this system")
     return Finding("memory", True, f"{there:.3g} GB, {free:.3g} GB of it unused")
 
 
 def _kernels() -> Finding:
-    """See to it that compiled kernels can be kept."""
+    """Check that the kernel cache is writable."""
     folder = Path(str(wp.config.kernel_cache_dir))
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 1e6
     try:
@@ -123,7 +124,7 @@ def _kernels() -> Finding:
 
 
 def _tried(name: str, what: Callable[[], str], needed: bool = False) -> Finding:
-    """Try something; whatever it raises is what is found."""
+    """Try something; an error is the finding."""
     try:
         return Finding(name, True, what(), needed)
     except Exception as error:
@@ -147,7 +148,7 @@ def _thirty_balls() -> Case[LiftedCylinder]:
 
 def measure_speed(resources: Resources) -> None:
     """Simulate one batch of the paper's study on all workers; its speed is noted as of any batch."""
-    study = chosen_study(None, None, resources)
+    study = load_study(scale=PAPER if resources.on_gpu else BENCH)
     with open_workers(resources) as workers:
         count = GPU_WORLDS * workers.count if workers.on_gpu else workers.count
         workers.simulate([study.case({}, seed) for seed in range(1, count + 1)])
@@ -170,7 +171,7 @@ def _dask() -> Finding:
 
 
 def _submission(resources: Resources) -> list[Finding]:
-    """See to it that jobs can be submitted from here, where the workers are jobs."""
+    """Check that jobs can be submitted from here, if the workers are jobs."""
     if not resources.submits_jobs or resources.cluster is None or missing_libraries():
         return []
     command = submit_command(resources.cluster.kind)

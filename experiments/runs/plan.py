@@ -23,9 +23,8 @@ from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.fresh_cases import cases_for
 from experiments.discover.search import Search
 from experiments.io.errors import StudyError
-from experiments.report.study_companion import companion_of
-from experiments.runs.campaign import check_runs
-from experiments.runs.search import Job, known_bank, read_data
+from experiments.runs.choices import Prepared, with_pictures
+from experiments.runs.search import SearchData, known_bank, read_data
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE, scenes_of
 
@@ -79,16 +78,12 @@ class Plan:
         return asdict(self) | self.totals
 
 
-def plan_calibration(study: Study, resources: Resources, published: int = 0, campaign: bool = True) -> Plan:
-    """Plan a calibration; published runs of the study, with so many replicates, come first."""
-    study = check_runs(study, campaign, published > 0)
-    tables = companion_of(study).planned_runs(published) if published else {}
-    stages: list[_Stage] = [
-        (title, _sampled(study, table), len(table), len(table)) for title, table in tables.items()
-    ]
-    stages += _campaign_stages(study) if campaign else []
+def plan_calibration(prepared: Prepared) -> Plan:
+    """Plan a calibration; pictures of its target are measured."""
+    study = with_pictures(prepared).study
+    stages = _campaign_stages(study)
     grains = max(work_of(case).grains for _, some, *_ in stages for case in some)
-    return _plan(study, resources, stages, CASE_BYTES + GRAIN_BYTES * grains)
+    return _plan(study, prepared.resources, stages, CASE_BYTES + GRAIN_BYTES * grains)
 
 
 def _campaign_stages(study: Study) -> list[_Stage]:
@@ -116,9 +111,10 @@ def _surface_cases(study: Study, kept: int) -> int:
     return (len(design.coded) - at_center) * settings.replicates + at_center
 
 
-def plan_search(job: Job, resources: Resources) -> Plan:
+def plan_search(prepared: Prepared, given: SearchData) -> Plan:
     """Plan a search: its bank if there is none, and for measured heaps fresh runs, expected and at most."""
-    study, search, bank, measured = job.study, Search.of(job.study), known_bank(job), read_data(job)
+    study, search = prepared.study, Search.of(prepared.study)
+    bank, measured = known_bank(search, prepared.folder, given.bank), read_data(study, given)
     simulator = EngineSimulator(study, search.library, OutcomeTable(Path("none.sqlite")))
     points, cases = bank_points(search.space, search.settings), []
     for i in np.linspace(0, len(points) - 1, min(SAMPLE, len(points))).astype(int):
@@ -128,13 +124,14 @@ def plan_search(job: Job, resources: Resources) -> Plan:
             continue
     stages: list[_Stage] = [] if bank else [("bank", cases, len(points), len(points))]
     if measured is not None:
-        stages.append(("fresh runs", cases, *cases_for(search, measured, bank, job.seed)))
-    return _plan(study, resources, stages, OUTCOME_BYTES)
+        stages.append(("fresh runs", cases, *cases_for(search, measured, bank, given.seed)))
+    return _plan(study, prepared.resources, stages, OUTCOME_BYTES)
 
 
-def plan_heap(study: Study, resources: Resources, case: Case) -> Plan:
+def plan_heap(prepared: Prepared, case: Case) -> Plan:
     """Plan one case."""
-    return _plan(study, resources, [("heap", [case], 1, 1)], GRAIN_BYTES * work_of(case).grains)
+    stored = GRAIN_BYTES * work_of(case).grains
+    return _plan(prepared.study, prepared.resources, [("heap", [case], 1, 1)], stored)
 
 
 def _sampled(study: Study, table: pd.DataFrame) -> list[Case]:

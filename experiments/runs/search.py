@@ -1,179 +1,145 @@
-"""A search for what a model lacks, in a folder: the bank, the analysis of measured heaps, its page."""
+"""A search for what a model lacks, in a folder: the bank, the analysis of measured heaps, the report."""
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dem_warp import Progress
 from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
-from experiments.cases import Workers, engine_of, open_folder, require_unused
-from experiments.cases.store.folder import locked
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.cases.store.outputs import publishing, sha256_of
-from experiments.cases.workers.own import THIS_MACHINE, watched_by
+from experiments.cases.store.outputs import sha256_of
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.search import Search
 from experiments.io.errors import InputError
 from experiments.io.files import replacing
-from experiments.journal.journal import Journal
 from experiments.measurement.measured_file import read_measured
 from experiments.report import HeapPicture, SolidHeap
-from experiments.report.discovery import Terms, write_discovery
+from experiments.report.discovery import Terms, results_of, verdict_line, write_discovery
 from experiments.report.discovery.compared_heaps import photograph, simulated_heaps, turned
-from experiments.report.study_companion import Companion, companion_of
-from experiments.runs.campaign import Watch, watching
-from experiments.runs.lasting import BANK, OUTCOMES, lasting_files
+from experiments.report.study_companion import companion_of
+from experiments.runs.choices import Prepared
+from experiments.runs.run_folder import BANK, OUTCOMES, Run, open_run
 from experiments.studyfile import Study
 from experiments.studyfile.observables import Instrument
 
 SETTINGS = "settings.json"
-"""File of the rules of a search, beside its report."""
+"""File of the rules of a search, next to its report."""
 
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Job:
-    """Order of a command; its parts are parameters of `experiments.api.discover`."""
+class SearchData:
+    """Data and bank of a search."""
 
-    study: Study
-    measured: Path | None
-    folder: Path
+    measured: Path | None = None
+    """File of measured heaps; None: only the bank is made."""
     bank: Path | None = None
+    """Bank made earlier for the study; None: that of the folder, that next to the study, or a new one."""
     photographs_only: bool = False
-    workers: Workers = THIS_MACHINE
+    """Look only at what photographs show."""
     seed: int = 1
+    """Seed of the bootstraps and of the fresh runs."""
 
 
 @dataclass(frozen=True)
 class SearchResult:
-    """End of a search."""
+    """A search that has ended."""
 
     discovery: Discovery | None
-    """None where only the bank was made."""
+    """Verdict and fits; None where only the bank was made."""
     terms: Terms
     page: Path
     """The report, or the bank."""
 
+    @property
+    def verdict(self) -> str:
+        """The verdict in one line; empty where only the bank was made."""
+        return verdict_line(self.discovery, self.terms) if self.discovery else ""
 
-class _Watched:
-    """The engine, with a display for every wave."""
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that was found as JSON-able data."""
+        return results_of(self.discovery, self.terms) if self.discovery else {}
 
-    def __init__(self, search: Search, job: Job, watch: Watch, journal: Journal) -> None:
-        table, workers = OutcomeTable(job.folder / OUTCOMES), watched_by(job.workers, journal.glimpses)
-        self.engine = EngineSimulator(search.study, search.library, table, workers, self._report)
-        self.observables = self.engine.observables
-        self.title = "library waves"
-        self.waves: list[dict[str, Any]] = []
-        self._watch, self._journal = watch, journal
-        self._listener: Callable[[Progress], None] | None = None
+
+class _ShownSimulator:
+    """The engine of an open run: each of its batches is shown, and noted with its wall time."""
+
+    def __init__(self, run: Run, engine: EngineSimulator) -> None:
+        self.observables = engine.observables
+        self.title = "bank"
+        self._run, self._engine = run, engine
 
     def __call__(self, points: Sequence[Point]) -> Outcomes:
-        """Observables of every point."""
-        started, before = time.perf_counter(), len(self.engine.table)
-        with watching(self.title, self._watch, self._journal) as self._listener:
-            outcomes = self.engine(points)
-        seconds, simulated = time.perf_counter() - started, len(self.engine.table) - before
-        self.waves.append({"wave": self.title, "simulated": simulated, "seconds": round(seconds, 1)})
-        return outcomes
-
-    def _report(self, progress: Progress) -> None:
-        if self._listener is not None:
-            self._listener(progress)
+        """Return the observables of every point."""
+        with self._run.batch(self.title, lambda: len(self._engine.table)) as progress:
+            return self._engine(points, progress)
 
 
-def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: nullcontext()) -> SearchResult:
+def run_search(prepared: Prepared, given: SearchData) -> SearchResult:
     """Look for what a study lacks, and write the report.
 
-    Nothing is written before study, data and bank have been read without an error.
-
-    Raises
-    ------
-    InputError
-        When the study cannot be searched, the data or the bank break a rule, or the folder is in use.
+    Raise InputError when the study cannot be searched, the data or the bank break a rule, or the folder
+    cannot be used; nothing is written then.
     """
-    if not resume:
-        require_unused(job.folder, "; --resume goes on in it")
-    companion, search = companion_of(job.study), Search.of(job.study)
-    terms = Terms.of(search.library, job.study.measurable, job.study.factor_sections)
-    bank = known_bank(job)
-    measured = read_data(job)
-    device = str(job.workers.described.get("device", ""))
+    study = prepared.study
+    companion, search = companion_of(study), Search.of(study)
+    terms = Terms.of(search.library, study.measurable, study.factor_sections)
+    bank, measured = known_bank(search, prepared.folder, given.bank), read_data(study, given)
     with (
-        locked(job.folder, resume),
-        Journal(job.folder, "discover", job.study, resume, device=device) as journal,
+        open_run("discover", prepared) as run,
+        EngineSimulator(study, search.library, OutcomeTable(run.folder / OUTCOMES), run.workers) as engine,
     ):
-        for change in open_folder(job.folder, job.study, resume)[1]:
-            _log.warning("The study has changed since the earlier run: %s", change)
-        return _search(job, search, companion, terms, bank, measured, watch, journal)
-
-
-def _search(
-    job: Job,
-    search: Search,
-    companion: Companion,
-    terms: Terms,
-    bank: Bank | None,
-    measured: Measured | None,
-    watch: Watch,
-    journal: Journal,
-) -> SearchResult:
-    """Simulate and analyse in an open folder, and make the outputs."""
-    simulator = _Watched(search, job, watch, journal)
-    with simulator.engine:
+        simulator = _ShownSimulator(run, engine)
         if bank is None:
-            maker = maker_of_today(source_commit(), simulator.engine.engine)
-            bank = search.make_bank(simulator, maker)
-            with replacing(job.folder / BANK) as temporary:
+            bank = search.make_bank(simulator, maker_of_today(source_commit(), engine.engine))
+            with replacing(run.folder / BANK) as temporary:
                 bank.save(temporary)
-        if measured is None:
-            with _publishing(job) as drafts:
+        made_from = {
+            "data": sha256_of(given.measured) if given.measured else None,
+            "photographs_only": given.photographs_only,
+            "seed": given.seed,
+        }
+        if measured is None or given.measured is None:
+            with run.publishing(**made_from) as drafts:
                 search.settings.write(drafts / SETTINGS)
-            return SearchResult(None, terms, job.folder / BANK)
+            return SearchResult(None, terms, run.folder / BANK)
         simulator.title, started = "fresh runs", time.perf_counter()
-        found = drive(search.analysis(measured, bank, job.seed), simulator)
-        waves = [*simulator.waves, {"wave": "analysis, its waves included", "seconds": _since(started)}]
-        pictures, solid = heaps_side_by_side(simulator.engine, found, terms, measured, job)
-    further = companion.discovery_chapters(found, terms, job.measured) if job.measured else ()
-    made = _provenance(job, bank, waves)
-    with _publishing(job) as drafts:
-        search.settings.write(drafts / SETTINGS)
-        page = write_discovery(
-            found, job.study, terms, search.settings, drafts, pictures, made, further, solid
-        )
-    return SearchResult(found, terms, job.folder / page.relative_to(drafts))
-
-
-def _publishing(job: Job) -> AbstractContextManager[Path]:
-    data = sha256_of(job.measured) if job.measured else None
-    made_from = {"data": data, "photographs_only": job.photographs_only, "seed": job.seed}
-    return publishing(job.folder, job.study, lasting_files(job.folder, job.study), **made_from)
+        found = drive(search.analysis(measured, bank, given.seed), simulator)
+        provenance = _provenance(run, given, bank) | {"seconds": round(time.perf_counter() - started, 1)}
+        pictures, solid = heaps_side_by_side(engine, found, terms, measured, given.seed)
+        further = companion.discovery_chapters(found, terms, given.measured)
+        with run.publishing(**made_from) as drafts:
+            search.settings.write(drafts / SETTINGS)
+            page = write_discovery(
+                found, study, terms, search.settings, drafts, pictures, provenance, further, solid
+            )
+        return SearchResult(found, terms, run.folder / page.relative_to(drafts))
 
 
 def heaps_side_by_side(
-    engine: EngineSimulator, found: Discovery, terms: Terms, measured: Measured, job: Job
+    engine: EngineSimulator, found: Discovery, terms: Terms, measured: Measured, seed: int
 ) -> tuple[list[HeapPicture], SolidHeap | None]:
-    """Draw a measured heap, where there is a photograph, that of the base, and that with the mechanism.
+    """Draw a measured heap, if there is a photograph, that of the base, and that with the mechanism.
 
-    The last of them comes to be turned, too; None where it is no heap.
+    The last of them can be turned, too; None for a test without a heap.
     """
-    if found.base is None or not job.study.scene.leaves_a_heap:
+    study = engine.study
+    if found.base is None or not study.scene.leaves_a_heap:
         return [], None
-    fitted = [condition.name for condition in job.study.conditions if not condition.held_out]
+    fitted = [condition.name for condition in study.conditions if not condition.held_out]
     training = [name for name in measured.conditions if name in fitted]
     condition = next((name for name in training if measured.pictures.get(name)), training[0])
     models = {"Calibrated base": found.base}
     if found.chosen is not None:
         models[f"With {terms.titles(found.chosen.mechanisms)}"] = found.chosen
-    results = engine.heaps([_point(fit, condition, job.seed) for fit in models.values()])
+    results = engine.heaps([_point(fit, condition, seed) for fit in models.values()])
     # simulated mechanisms have the azimuth 0: the heaps are shown as the camera sees them
     side = measured.views.get(condition, 0.0)
     results = [
@@ -181,49 +147,41 @@ def heaps_side_by_side(
         for fit, result in zip(models.values(), results, strict=True)
     ]
     photographs = measured.pictures.get(condition, ())[:1]
-    taken = [photograph(path, condition, job.study.measurement.fit) for path in photographs]
-    drawn = simulated_heaps(dict(zip(models, results, strict=True)), condition, job.study.under(condition))
+    taken = [photograph(path, condition, study.measurement.fit) for path in photographs]
+    drawn = simulated_heaps(dict(zip(models, results, strict=True)), condition, study.under(condition))
     shown = [picture for picture in taken if picture is not None] + drawn
     title = list(models)[-1]
     return shown, SolidHeap.of(f"{title}: a heap under the condition “{condition}”.", results[-1])
 
 
-def known_bank(job: Job) -> Bank | None:
-    """Read the bank that is named, that of the folder, or that beside the study; None: it is to be made.
+def known_bank(search: Search, folder: Path, named: Path | None = None) -> Bank | None:
+    """Read the bank that is named, that of the folder, or that next to the study; None: it is to be made.
 
-    Raises
-    ------
-    InputError
-        When it is no bank, or that of another study.
+    Raise InputError when it is not a bank, or that of another study.
     """
-    search = Search.of(job.study)
-    beside = job.study.file.with_name(f"bank-{job.study.scale}.npz" if job.study.scale else BANK)
-    if job.bank is not None:
-        return search.read_bank(job.bank)
-    return next((search.read_bank(path) for path in (job.folder / BANK, beside) if path.is_file()), None)
+    if named is not None:
+        return search.read_bank(named)
+    study = search.study
+    shipped = study.file.with_name(f"bank-{study.scale}.npz" if study.scale else BANK)
+    return next((search.read_bank(path) for path in (folder / BANK, shipped) if path.is_file()), None)
 
 
-def read_data(job: Job) -> Measured | None:
-    """Read what was measured, as far as it is looked at, and say what is to be known about it.
+def read_data(study: Study, given: SearchData) -> Measured | None:
+    """Read the measured heaps, as far as they are looked at; None where only the bank is wanted.
 
-    None where only the library waves are wanted.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read or breaks a rule.
+    Raise InputError when the file cannot be read or breaks a rule.
     """
-    if job.measured is None:
+    if given.measured is None:
         return None
-    measured = read_measured(job.measured, job.study)
+    measured = read_measured(given.measured, study)
     for note in measured.notes:
         _log.warning("The data: %s", note)
-    if not job.photographs_only:
+    if not given.photographs_only:
         return measured
-    shown = [each.name for each in job.study.measurable if each.instrument is Instrument.PHOTOGRAPH]
+    shown = [each.name for each in study.measurable if each.instrument is Instrument.PHOTOGRAPH]
     if not set(shown) & set(measured.observables):
-        rule = f"a search on photographs only needs what they show: one of {', '.join(shown)}"
-        raise InputError(str(job.measured), rule, ", ".join(measured.observables))
+        problem = f"--photographs-only needs an observable that photographs show: {', '.join(shown)}"
+        raise InputError(str(given.measured), problem, ", ".join(measured.observables))
     return measured.only(shown)
 
 
@@ -232,17 +190,12 @@ def _point(fit: Fit, condition: str, seed: int) -> Point:
     return Point(fit.theta, tuple(sorted(sizes)), condition, seed)
 
 
-def _provenance(job: Job, bank: Bank, waves: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _provenance(run: Run, given: SearchData, bank: Bank) -> dict[str, Any]:
     return {
-        **job.workers.described,
-        "commit": source_commit(),
-        "engine": fingerprint_of(engine_of(job.study)),
+        **run.provenance,
+        "engine": fingerprint_of(run.store.engine),
         "bank": dict(bank.maker) or None,
-        "photographs only": job.photographs_only,
-        "data": job.measured.name if job.measured else None,
-        "waves": list(waves),
+        "photographs only": given.photographs_only,
+        "data": given.measured.name if given.measured else None,
+        "batches": run.wall_times,
     }
-
-
-def _since(started: float) -> float:
-    return round(time.perf_counter() - started, 1)

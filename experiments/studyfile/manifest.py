@@ -1,4 +1,4 @@
-"""The study of a folder of results: ``study.json``, its hash, and the differences from another."""
+"""The study of a folder of results: ``study.json``, its hash, and its differences from another study."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def study_hash(study: Study) -> str:
 
 
 def write_manifest(folder: Path, study: Study) -> None:
-    """Write the file that says which study the folder belongs to."""
+    """Write the file with the study of the folder."""
     write_text(folder / MANIFEST, json.dumps(describe(study), indent=1, allow_nan=False))
 
 
 def differences(old: object, new: object, path: KeyPath = ()) -> Iterator[str]:
-    """Name every key whose value differs, as ``key: old -> new``."""
+    """Yield each key whose value differs, in the form ``key: old -> new``."""
     if isinstance(old, Mapping) and isinstance(new, Mapping):
         for key in [*old, *(key for key in new if key not in old)]:
             yield from differences(old.get(key), new.get(key), (*path, key))
@@ -57,10 +57,7 @@ def _shown(value: object) -> str:
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Read what `write_manifest` wrote.
 
-    Raises
-    ------
-    StoreError
-        When the folder has no such file, or it cannot be read.
+    Raise StoreError when the folder has no such file, or it cannot be read.
     """
     path = folder / MANIFEST
     try:

@@ -1,4 +1,4 @@
-"""The folder contract: a case as files for any program, and its answer. docs/engine.md is its text."""
+"""The folder contract of docs/engine.md: a case as files for any program, and its answer."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FORMAT = 1
 """Version of the contract."""
 
 CASE, HEAP, RESULT = "case.json", "heap.csv", "result.json"
-"""The case; and the answer: the heap's spheres, and its status and observables."""
+"""Files of the case and of the answer: the heap's spheres, its status and observables."""
 
 COLUMNS = ("x", "y", "z", "r")
 """Columns of the heap [m]; a further one, ``grain``, numbers the grain of each sphere."""
@@ -42,7 +42,7 @@ class CommandProgram:
     words: tuple[str, ...]
     version: str = ""
     observables: tuple[str, ...] = ()
-    """Observables of the test that it tells beside the heap."""
+    """Observables of the test that it gives with the heap."""
 
     @property
     def name(self) -> str:
@@ -53,14 +53,14 @@ class CommandProgram:
     def identity(self) -> dict[str, Any]:
         """The command's words, and what is in the scripts that they name."""
         digests = {str(number): _digest(word) for number, word in enumerate(self.words) if _is_script(word)}
-        told = {"contract": FORMAT, "observables": list(self.observables)}
-        return {"command": self.name, "version": self.version, "files": digests, **told}
+        answer = {"contract": FORMAT, "observables": list(self.observables)}
+        return {"command": self.name, "version": self.version, "files": digests, **answer}
 
     def check(self, case: Case) -> None:
-        """Take every case: what a program lacks it says itself."""
+        """Accept every case: the program itself rejects what it lacks."""
 
     def answers(self, case: Case) -> tuple[str, ...]:
-        """Name the files of the answer."""
+        """Return the names of the files of the answer."""
         return HEAP, RESULT
 
     def write(self, case: Case, folder: Path) -> Sequence[str]:
@@ -76,28 +76,25 @@ class CommandProgram:
 def command_program(
     command: str, folder: Path, place: str, version: str = "", observables: tuple[str, ...] = ()
 ) -> CommandProgram:
-    """Program of a command; words that name files in a folder become their whole paths.
+    """Build the program of a command; words that name files in a folder become whole paths.
 
-    Raises
-    ------
-    InputError
-        When there is no such program; `place` says where the command stands.
+    Raise InputError when there is no such program; `place` is that of the command.
     """
     try:
         first, *others = words_of(command)
     except ValueError as error:
         raise InputError(place, str(error) or "must name a program", command) from None
-    beside = folder / first
-    program = str(beside.resolve()) if beside.is_file() else shutil.which(first)
-    if program is None or (beside.is_file() and shutil.which(program) is None):
-        rule = f"must begin with a program that can be run: on the PATH, or a file in {folder.resolve()}"
-        raise InputError(place, rule, first)
+    local = folder / first
+    program = str(local.resolve()) if local.is_file() else shutil.which(first)
+    if program is None or (local.is_file() and shutil.which(program) is None):
+        problem = f"must begin with a program on the PATH or in {folder.resolve()}"
+        raise InputError(place, problem, first)
     words = [str((folder / word).resolve()) if (folder / word).is_file() else word for word in others]
     return CommandProgram((program, *words), version, observables)
 
 
 def _is_script(word: str) -> bool:
-    """Tell a file that is no compiled program."""
+    """True if a word is a file, but not a compiled program."""
     path = Path(word)
     if not (path.is_absolute() and path.is_file()):
         return False
@@ -115,10 +112,7 @@ def _digest(word: str) -> str:
 def write_case(case: Case[Any], folder: Path) -> None:
     """Write a case into a folder: ``case.json`` in SI, and the clumps and walls that it names.
 
-    Raises
-    ------
-    ValueError
-        When the case's test does not say which walls it has.
+    Raise ValueError when the case's test does not say which walls it has.
     """
     grains, mixture, scene = case.grains, case.grains.mixture, case.scene
     clumps = []
@@ -165,12 +159,12 @@ def write_case(case: Case[Any], folder: Path) -> None:
 
 
 def _sizes(grains: GrainPopulation) -> dict[str, Any]:
-    """Distribution of the sizes: a normal one, cut, or classes."""
-    told: dict[str, Any] = {"mean": grains.size_mean, "sd": grains.size_sd}
+    """Lay out the distribution of the sizes: normal and cut, or classes."""
+    sizes: dict[str, Any] = {"mean": grains.size_mean, "sd": grains.size_sd}
     if grains.classes is None:
-        return told | {"cut": SIZE_LIMIT}
+        return sizes | {"cut": SIZE_LIMIT}
     pairs = zip(grains.classes.sizes, grains.classes.fractions, strict=True)
-    return told | {"classes": [{"size": size, "fraction": fraction} for size, fraction in pairs]}
+    return sizes | {"classes": [{"size": size, "fraction": fraction} for size, fraction in pairs]}
 
 
 def _material(material: Material) -> dict[str, float]:
@@ -178,14 +172,14 @@ def _material(material: Material) -> dict[str, float]:
 
 
 def _laws(case: Case[Any]) -> dict[str, Any]:
-    """Contact laws of a case: the name of their set, each choice, the softening, mechanisms beside them."""
+    """Lay out the contact laws: the name of their set, each choice, the softening, the mechanisms."""
     softened = {"modulus_scale": case.numerics.modulus_scale}
     mechanisms = {"mechanisms": case.to_dict()["mechanisms"]}
     return {"set": case.laws.name} | case.laws.to_dict() | softened | mechanisms
 
 
 def _scene(case: Case[Any]) -> dict[str, Any]:
-    """Kind and settings of the test, and how many grains are poured at the most."""
+    """Lay out the kind and settings of the test, and the most grains that are poured."""
     settings = {
         f.name: getattr(case.scene, f.name)
         for f in dataclasses.fields(case.scene)
@@ -195,17 +189,17 @@ def _scene(case: Case[Any]) -> dict[str, Any]:
 
 
 def _walls(case: Case[Any], folder: Path) -> list[dict[str, Any]]:
-    """Walls where they stand before anything moves: shape, surface, and a file of triangles each."""
+    """Lay out the walls before they move: shape, surface, and a file of triangles each."""
     grains, scene = case.grains, case.scene
     reach = grains.size_range[1] * max(shape.bounding_radius for shape in grains.mixture.shapes)
     half_width = max(scene.room(reach)[:2])
-    walls, told = scene.walls(reach), []
+    walls, rows = scene.walls(reach), []
     contacts, holds = scene.surfaces(case, len(walls))
     for number, wall in enumerate(walls):
         name = f"wall-{number + 1}.stl"
         write_text(folder / name, stl_text(triangles_of(wall, half_width), f"wall-{number + 1}"))
         contact = contacts[holds[number]]
-        told.append(
+        rows.append(
             {
                 "kind": type(wall).__name__.lower(),
                 "file": name,
@@ -219,8 +213,8 @@ def _walls(case: Case[Any], folder: Path) -> list[dict[str, Any]]:
             }
         )
         if part := scene.part_of(case, number):
-            told[-1] |= {"restitution": part.surface.restitution, "material": _material(part.material)}
-    return told
+            rows[-1] |= {"restitution": part.surface.restitution, "material": _material(part.material)}
+    return rows
 
 
 # ---- the answer --------------------------------------------------------------------------------------------
@@ -229,40 +223,37 @@ def _walls(case: Case[Any], folder: Path) -> list[dict[str, Any]]:
 def read_answer(case: Case[Any], folder: Path) -> CaseResult:
     """Read the answer to a case.
 
-    Raises
-    ------
-    AnswerError
-        When a file is missing or malformed, or a number is not finite.
+    Raise AnswerError when a file is missing or malformed, or a number is not finite.
     """
-    told = _read_result(folder / RESULT)
-    status, reason = told.get("status"), told.get("reason", "")
+    answer = _read_result(folder / RESULT)
+    status, reason = answer.get("status"), answer.get("reason", "")
     if status not in STATUSES:
         raise AnswerError(f"{RESULT}: status must be one of {', '.join(STATUSES)}, got {_shown(status)}")
     if not isinstance(reason, str) or (status != "finished" and not reason.strip()):
         raise AnswerError(f"{RESULT}: a case that {status} needs its reason, got {_shown(reason)}")
-    made_by = {"program": str(told.get("program", ""))}
+    made_by = {"program": str(answer.get("program", ""))}
     if status != "finished":
         return empty_result(status, reason, made_by)
-    observables = _observables(told.get("observables", {}), list(case.scene.observables))
+    observables = _observables(answer.get("observables", {}), list(case.scene.observables))
     return heap_result(*read_heap(folder / HEAP), observables, made_by)
 
 
 def _read_result(path: Path) -> dict[str, Any]:
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        answer = json.loads(path.read_text(encoding="utf-8"))
     except OSError:
         raise AnswerError(f"the program wrote no {path.name}") from None
     except (ValueError, RecursionError) as error:
         raise AnswerError(f"{path.name}: must be JSON: {error}") from None
-    if not isinstance(told, dict):
-        raise AnswerError(f"{path.name}: must be a JSON object, got {_shown(told)}")
-    return told
+    if not isinstance(answer, dict):
+        raise AnswerError(f"{path.name}: must be a JSON object, got {_shown(answer)}")
+    return answer
 
 
-def _observables(told: object, known: list[str]) -> dict[str, float]:
-    if not isinstance(told, dict):
-        raise AnswerError(f"{RESULT}: observables must be a JSON object, got {_shown(told)}")
-    for name, value in told.items():
+def _observables(given: object, known: list[str]) -> dict[str, float]:
+    if not isinstance(given, dict):
+        raise AnswerError(f"{RESULT}: observables must be a JSON object, got {_shown(given)}")
+    for name, value in given.items():
         if name not in known:
             raise AnswerError(f"{RESULT}: observables.{name}: must be one of {', '.join(known)}")
         if (
@@ -271,21 +262,18 @@ def _observables(told: object, known: list[str]) -> dict[str, float]:
             or not abs(value) <= sys.float_info.max
         ):
             raise AnswerError(f"{RESULT}: observables.{name}: must be a finite number, got {_shown(value)}")
-    return {name: float(value) for name, value in told.items()}
+    return {name: float(value) for name, value in given.items()}
 
 
 def read_heap(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Read spheres of a heap, in metres where the file names no unit, in any format of `sphere_files`.
+    """Read the spheres of a heap, in any format of `experiments.grains.spheres`; default unit: metre.
 
     Returns
     -------
     spheres, grains
         Centres and radii [m], (n, 4), and the number of each one's grain, (n,).
 
-    Raises
-    ------
-    AnswerError
-        When the file is missing, or a line breaks the rules.
+    Raise AnswerError when the file is missing, or a line breaks the rules.
     """
     if not path.is_file():
         raise AnswerError(f"the program wrote no {path.name}")
@@ -305,7 +293,7 @@ def _shown(value: object) -> str:
 def heap_result(
     spheres: np.ndarray, grains: np.ndarray, observables: dict[str, float], provenance: dict[str, Any]
 ) -> CaseResult:
-    """Result of a finished case from its spheres [m], (n, 4), and the number of each one's grain, (n,)."""
+    """Build the result of a finished case from its spheres [m], (n, 4), and the grain of each, (n,)."""
     order = np.argsort(grains, kind="stable")
     spheres, counts = spheres[order], np.bincount(grains)
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])

@@ -1,4 +1,4 @@
-"""Drivers: codes that a case can be exported to, as engines. They run the exported input in its folder."""
+"""Drivers: codes that a case can be exported to, as engines that run the exported input."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from experiments.io.errors import InputError
 from experiments.io.files import write_text
 
 APPROXIMATE = "[engine] approximate = true (bridge: --approximate)"
-"""Words that ask for the nearest of what a code lacks."""
+"""Setting that asks for the nearest of what a code lacks."""
 
 
 @dataclass(frozen=True)
@@ -29,20 +29,20 @@ class Driver:
     name: str
     """Name of its exporter."""
     approximate: bool = False
-    """Take the nearest for what the code lacks, as the exporter does when it is told to."""
+    """Take the nearest for what the code lacks, as the exporter does."""
     observables: tuple[str, ...] = ()
 
     def answers(self, case: Case) -> tuple[str, ...]:
-        """Name the file of the heap."""
+        """Return the name of the heap's file."""
         return (self._translation(case).heap,)
 
     @property
     def identity(self) -> dict[str, Any]:
-        """Name of the code, and what its exporter's source means."""
+        """Name of the code, and the hash of the exporters."""
         return {"driver": self.name, "approximate": self.approximate, "exporters": _exporters()}
 
     def check(self, case: Case) -> None:
-        """Raise ValueError where the code has no input of a case, lacks something of it, or is not there."""
+        """Raise ValueError if the code cannot simulate a case or is not installed."""
         self._located(self._translation(case))
 
     def write(self, case: Case, folder: Path) -> Sequence[str]:
@@ -68,13 +68,13 @@ class Driver:
         program = translation.command[0]
         if path := shutil.which(program):
             return path
-        rule = f"{EXPORTERS[self.name].code} must be installed, its program on the PATH"
-        raise InputError("engine", rule, program)
+        problem = f"{EXPORTERS[self.name].code} is not on the PATH"
+        raise InputError("engine", problem, program)
 
 
 @cache
 def _exporters() -> str:
-    """Hash of what the exporters' sources mean."""
+    """Return the hash of the exporters' sources, without docstrings and comments."""
     folder, digest = Path(experiments.export.__path__[0]), hashlib.sha256()
     for path in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".toml", ".txt")):
         text = path.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The interface of an engine: whatever turns cases into results in place of `dem_warp.simulate`."""
+"""The interface of an engine, which turns cases into results in place of `dem_warp.simulate`."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from dem_warp import Case, CaseResult
 from dem_warp.result import OnProgress, OnResult
 
 NO_ANSWER = "no-answer"
-"""Status of a case whose program failed or gave no valid answer: it is not kept, and may be tried again."""
+"""Status of a case whose program failed or gave no valid answer: it is not kept, and may be repeated."""
 
 
 class Engine(Protocol):
-    """A function of cases, as `dem_warp.simulate` is one.
+    """A function of cases, like `dem_warp.simulate`.
 
-    One whose results depend on more than its code has that as ``identity``, JSON-able data; one that tells
-    only some observables of a scene has their names as ``observables``; and one that cannot simulate every
-    case has a method ``check``, which raises ValueError for those that it cannot.
+    An engine whose results depend on more than its code has that as ``identity``, JSON-able data; one that
+    gives only some observables of a scene has their names as ``observables``; and one that cannot simulate
+    every case has a method ``check``, which raises ValueError for those that it cannot.
     """
 
     def __call__(

@@ -31,20 +31,15 @@ ENGINES: Registry[Engine] = Registry("dem_warp.engines", _DRIVERS, _check)
 def with_engine(study: Study, name: str | None = None, command: str | None = None, **limits: Any) -> Study:
     """Return a study whose cases another engine simulates, by its name or its command; None: its own.
 
-    Further keys of the section, such as ``time_limit``, are laid over the study's; None leaves one as it is.
-    A command's files are looked for in the current folder.
+    Further keys of the section, e.g. ``time_limit``, replace the study's; None leaves one as it is. The files
+    of a command are searched in the current folder.
 
-    Raises
-    ------
-    InputError
-        When there is none of this name, the command is no command, or both are given.
+    Raise InputError when no engine has this name, the command is not valid, or both are given.
     """
     if name is None and command is None:
         return study
     if name is not None and command is not None:
-        raise InputError(
-            "engine", "expected an engine is given by its name or by its command", f"{name}; {command}"
-        )
+        raise InputError("engine", "cannot have both a name and a command", f"{name}; {command}")
     if name is not None and name not in ENGINES:
         raise InputError("engine", f"must be one of {', '.join(ENGINES) or 'none'}", name)
     own = study.document.get("engine", {})
@@ -59,13 +54,10 @@ def with_engine(study: Study, name: str | None = None, command: str | None = Non
 
 
 def engine_of(study: Study) -> Engine | None:
-    """Engine that a study names; None is that of dem-warp.
+    """Return the engine that a study names; None is that of dem-warp.
 
-    Raises
-    ------
-    StudyError
-        When there is none of its name, its program is not there, it cannot simulate the study's cases, a rule
-        for programs is given to what is none, or the study's card was corrected for another solver.
+    Raise StudyError when no engine has this name, its program is missing, it cannot simulate the study's
+    cases, it does not take the settings of a program, or the study's card was corrected for another solver.
     """
     section, place = study.engine, f"{study.file}: engine"
     solver, solver_place = study.solver, f"{study.file}: solver.{CARD_SOLVER}"
@@ -84,36 +76,30 @@ def engine_of(study: Study) -> Engine | None:
         try:
             check(study.case({}, seed=0))
         except InputError as error:
-            # each on its own line: a code may lack more than one message holds
+            # each on its own line: a code may lack more than one thing
             found = (Problem(place, problem.problem, problem.value) for problem in error.problems)
             raise StudyError.of(found) from None
         except ValueError as error:
-            raise StudyError(
-                place, f"expected {section.name} cannot run this study: {error}", section.name
-            ) from None
+            raise StudyError(place, f"cannot run this study: {error}", section.name) from None
     return engine
 
 
 def _engine_named(section: EngineSection, place: str) -> Engine:
-    """Engine of a section's name, with the section's limits."""
+    """Return the engine of a section's name, with the section's limits."""
     if section.name is None or section.name not in ENGINES:
         rule = f"must be one of {', '.join(ENGINES) or 'none'}"
         raise StudyError(f"{place}.name", rule, section.name)
     engine = ENGINES[section.name]
     if section.version or section.observables:
-        rule = "expected version and observables belong to a command; an engine of a name knows its own"
+        rule = "version and observables are settings of a command"
         raise StudyError(place, rule, section.version or list(section.observables))
     driver = engine.program if isinstance(engine, ProgramEngine) else None
     if section.approximate and not isinstance(driver, Driver):
-        raise StudyError(
-            f"{place}.approximate", "expected belongs to the codes that a case is exported to", True
-        )
+        raise StudyError(f"{place}.approximate", "is a setting of the codes that a case is exported to", True)
     if isinstance(driver, Driver):
         return ProgramEngine(Driver(driver.name, section.approximate), section.workers, section.time_limit)
     if isinstance(engine, ProgramEngine):
         return replace(engine, workers=section.workers, time_limit=section.time_limit)
     if section.time_limit is not None:
-        raise StudyError(
-            place, "expected this engine runs no program that a limit could end", section.time_limit
-        )
+        raise StudyError(place, "this engine runs no program that a limit could end", section.time_limit)
     return engine

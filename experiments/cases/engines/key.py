@@ -20,10 +20,10 @@ A clump's centre of mass is a sum whose last bits differ between processors, by 
 
 
 def case_key(case: Case, engine: Engine | None = None, **more: object) -> str:
-    """Key of a case: a hash of all that determines its result, the engine's own code included.
+    """Return the key of a case: a hash of all that determines its result, the engine's code included.
 
-    Spheres of its shapes that agree to `SHAPE_DIGITS` count as the same. ``more`` is whatever else determines
-    what is kept under the key, as JSON-able data.
+    Spheres of its shapes that agree to `SHAPE_DIGITS` count as the same. ``more`` is JSON-able data that
+    determines what is kept under the key, too.
     """
     determined_by = {"case": described(case), **_made_by(case, engine), **more}
     text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
@@ -31,12 +31,12 @@ def case_key(case: Case, engine: Engine | None = None, **more: object) -> str:
 
 
 def engine_identity(engine: Engine) -> Any:
-    """All that an engine tells of what determines its results, or else its name."""
+    """Return an engine's ``identity``, or else its name."""
     return getattr(engine, "identity", None) or getattr(engine, "__qualname__", type(engine).__qualname__)
 
 
 def _made_by(case: Case, engine: Engine | None) -> dict[str, Any]:
-    """Code that makes the result; an engine that tells its identity does without dem-warp's solver."""
+    """Describe the code that makes the result; an engine with an identity does not use dem-warp's solver."""
     if engine is None:
         return {"engine": engine_fingerprint(*case.kinds)}
     own = () if getattr(engine, "identity", None) else (*case.kinds, engine)
@@ -44,7 +44,7 @@ def _made_by(case: Case, engine: Engine | None) -> dict[str, Any]:
 
 
 def described(case: Case) -> dict[str, Any]:
-    """All of a case that determines its result, as JSON-able data."""
+    """Describe all of a case that determines its result, as JSON-able data."""
     described = case.to_dict()
     shape = described["grains"]["shape"]
     for spheres in shape.get("shapes", [shape]):
@@ -53,10 +53,10 @@ def described(case: Case) -> dict[str, Any]:
 
 
 def _rounded(centers: np.ndarray, radii: np.ndarray) -> dict[str, Any]:
-    """Spheres relative to their size, and the size."""
+    """Return spheres relative to their size, and the size."""
     size = float(np.max(np.linalg.norm(centers, axis=1) + radii))
     return {
-        # Adding 0 turns a negative zero into zero.
+        # adding 0 turns a negative zero into zero
         "centers": (np.round(centers / size, SHAPE_DIGITS) + 0.0).tolist(),
         "radii": np.round(radii / size, SHAPE_DIGITS).tolist(),
         "size": f"{size:.{SHAPE_DIGITS}g}",

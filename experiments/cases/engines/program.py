@@ -1,7 +1,7 @@
 """Programs as engines: one folder a case, several at once, each failure a status with its reason.
 
 A finished case is never run twice: its answer stays in its folder until the caller, who keeps results,
-removes the folder of all. What a program failed at is tried again.
+removes all folders. A case that failed is tried again.
 """
 
 from __future__ import annotations
@@ -26,50 +26,50 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
 from dem_warp.result import OnProgress, OnResult
-from experiments.cases.engines import keeper
+from experiments.cases.engines import run_program
 from experiments.cases.engines.engine import NO_ANSWER
 from experiments.cases.engines.key import case_key
 
 FAILED = "failed"
-"""Folder, beside that of the running cases, of those whose program failed: what it wrote is there."""
+"""Folder, next to that of the running cases, of the cases whose program failed, with all that it wrote."""
 
-TOLD = 200
-"""Characters of a program's last words that a reason tells."""
+SHOWN = 200
+"""Characters of a program's last line that a reason shows."""
 
 REPORT_EVERY = 1.0
 """Time between two reports of progress [s]."""
 
 
 class AnswerError(Exception):
-    """A program gave no answer, or one that breaks the rules."""
+    """A program gave no answer, or an invalid one."""
 
 
 class Program(Protocol):
-    """Another program: how a case is put to it, and how its answer is read."""
+    """Another program: it gets a case as files and leaves its answer as files."""
 
     @property
     def name(self) -> str:
-        """Name in words."""
+        """Name for people."""
 
     @property
     def identity(self) -> dict[str, Any]:
-        """All beside a case that determines its result, as JSON-able data."""
+        """Everything but the case that determines its result, as JSON-able data."""
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """Observables of the test that it tells beside the heap."""
+        """Observables of the test that it gives with the heap."""
 
     def answers(self, case: Case) -> tuple[str, ...]:
-        """Name the files that it leaves and `read` reads."""
+        """Return the names of the files that it leaves and `read` reads."""
 
     def check(self, case: Case) -> None:
         """Raise ValueError for a case that it cannot simulate."""
 
     def write(self, case: Case, folder: Path) -> Sequence[str]:
-        """Write a case into an empty folder, and return the words of the command that is run there."""
+        """Write a case into an empty folder, and return the words of the command to run there."""
 
     def read(self, case: Case, folder: Path) -> CaseResult:
-        """Read the answer from a folder; raises AnswerError where there is none."""
+        """Read the answer from a folder; raise AnswerError without a valid one."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class ProgramEngine:
     workers: int | None = None
     """Cases at once; None: one a core."""
     time_limit: float | None = None
-    """Wall time of a case [s]; None: none."""
+    """Wall time of a case [s]; None: no limit."""
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -89,7 +89,7 @@ class ProgramEngine:
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """Observables of the test that the program tells beside the heap."""
+        """Observables of the test that the program gives with the heap."""
         return self.program.observables
 
     def check(self, case: Case) -> None:
@@ -105,18 +105,20 @@ class ProgramEngine:
         on_progress: OnProgress | None = None,
         checkpoint: str | Path | None = None,
     ) -> list[CaseResult]:
-        """Simulate cases; the device is the program's own affair."""
+        """Simulate cases; the program chooses its own device."""
         with ExitStack() as stack:
             root = checkpoint or stack.enter_context(tempfile.TemporaryDirectory(prefix="dem-warp-"))
-            crew = stack.enter_context(_Crew(self, Path(root).resolve(), keeps=checkpoint is not None))
+            programs = stack.enter_context(
+                _RunningPrograms(self, Path(root).resolve(), keeps=checkpoint is not None)
+            )
             pool = stack.enter_context(
                 ThreadPoolExecutor(min(workers or self.workers or os.cpu_count() or 1, max(len(cases), 1)))
             )
-            begun = {pool.submit(crew.run, case): index for index, case in enumerate(cases)}
+            begun = {pool.submit(programs.run, case): index for index, case in enumerate(cases)}
             try:
                 return _gather(begun, on_result, on_progress)
             except BaseException:
-                crew.end()
+                programs.end()
                 pool.shutdown(wait=True, cancel_futures=True)
                 raise
 
@@ -142,18 +144,18 @@ def _gather(
 
 
 @dataclass
-class _Crew:
-    """Programs that run at the moment, and the folders of their cases."""
+class _RunningPrograms:
+    """Programs that are running, and the folders of their cases."""
 
     engine: ProgramEngine
     root: Path
     keeps: bool
-    """True where folders outlive the call."""
+    """True if the folders outlive the call."""
     running: set[subprocess.Popen[bytes]] = field(default_factory=set)
     ended: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def __enter__(self) -> _Crew:
+    def __enter__(self) -> _RunningPrograms:
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -168,28 +170,28 @@ class _Crew:
                     process.stdin.close()
 
     def run(self, case: Case) -> CaseResult:
-        """Simulate a case, or take up the answer that a run before left of it."""
+        """Simulate a case, or read the answer that an earlier run left."""
         folder, program = self.root / case_key(case, self.engine)[:24], self.engine.program
         try:
             if _ending(folder).get("code") != 0:
-                self._run_afresh(case, folder)
+                self._run_program(case, folder)
             result = self._read(case, folder)
         except AnswerError as error:
             reason = str(error) + self._put_aside(folder)
             return empty_result(NO_ANSWER, reason, {"engine": program.name})
-        # the laws that were asked for; an engine's name says whether the nearest may stand for them
+        # the laws that were asked for; the engine may have taken the nearest
         asked = {"laws": case.laws.to_dict()}
         made_by = {"engine": program.name, "seconds": _ending(folder)["seconds"]} | asked
         return replace(result, provenance=result.provenance | made_by)
 
-    def _run_afresh(self, case: Case, folder: Path) -> None:
+    def _run_program(self, case: Case, folder: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         try:
             words = self.engine.program.write(case, folder)
         except ValueError as error:
-            raise AnswerError(f"the case cannot be put to the program: {error}") from error
-        self._keep(words, folder)
+            raise AnswerError(f"the program cannot simulate the case: {error}") from error
+        self._wait_for(words, folder)
         limit = self.engine.time_limit
         ending = _ending(folder)
         if ending.get("timed_out"):
@@ -197,18 +199,18 @@ class _Crew:
         if "error" in ending:
             raise AnswerError(f"the program {words[0]} could not be started: {ending['error']}")
         if code := ending.get("code", -1):
-            raise AnswerError(f"the program ended with {_ended_with(code)}{_last_words(folder)}")
+            raise AnswerError(f"the program ended with {_ended_with(code)}{_last_line(folder)}")
 
-    def _keep(self, words: Sequence[str], folder: Path) -> None:
-        """Run a program under a keeper until it ends."""
+    def _wait_for(self, words: Sequence[str], folder: Path) -> None:
+        """Run a program until it ends."""
         limit = math.inf if self.engine.time_limit is None else self.engine.time_limit
-        order = [sys.executable, "-I", "-S", keeper.__file__, repr(float(limit)), *words]
+        order = [sys.executable, "-I", "-S", run_program.__file__, repr(float(limit)), *words]
         with self.lock:
             if self.ended:
                 raise AnswerError("the run was interrupted before the program was started")
-            # A session of its own: an interrupt at the terminal reaches this process alone, which decides.
+            # in its own session, so that an interrupt at the terminal reaches this process alone
             process = subprocess.Popen(
-                order, cwd=folder, stdin=subprocess.PIPE, start_new_session=keeper.POSIX
+                order, cwd=folder, stdin=subprocess.PIPE, start_new_session=run_program.POSIX
             )
             self.running.add(process)
         try:
@@ -224,13 +226,13 @@ class _Crew:
         try:
             result = program.read(case, folder)
         except AnswerError as error:
-            raise AnswerError(f"{error}{_last_words(folder)}") from error
-        if self.keeps:  # what else the program left may be large
-            _remove_others(folder, {keeper.ENDING, *program.answers(case)})
+            raise AnswerError(f"{error}{_last_line(folder)}") from error
+        if self.keeps:  # other files of the program may be large
+            _remove_others(folder, {run_program.ENDING, *program.answers(case)})
         return result
 
     def _put_aside(self, folder: Path) -> str:
-        """Keep the folder of a case that failed for whoever looks for the cause, and say where."""
+        """Keep the folder of a case that failed, and say where it is."""
         if self.ended or not self.keeps or not folder.is_dir():
             return ""
         aside = self.root.with_name(FAILED) / folder.name
@@ -241,9 +243,9 @@ class _Crew:
 
 
 def _ending(folder: Path) -> dict[str, Any]:
-    """Note of a program's end; empty where there is none."""
+    """Read the note of a program's end; empty without one."""
     try:
-        return json.loads((folder / keeper.ENDING).read_text(encoding="utf-8"))
+        return json.loads((folder / run_program.ENDING).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
 
@@ -252,18 +254,18 @@ def _ended_with(code: int) -> str:
     return f"the exit code {code}" if code >= 0 else f"the signal {-code}"
 
 
-def _last_words(folder: Path) -> str:
-    """Last line that a program wrote: one that says ``ERROR``, else of its errors, else of its output."""
+def _last_line(folder: Path) -> str:
+    """Return the last line that a program wrote: an ``ERROR``, else of its errors, else of its output."""
     lines = []
-    for name in (keeper.OUTPUT, keeper.ERRORS):
+    for name in (run_program.OUTPUT, run_program.ERRORS):
         try:
             text = (folder / name).read_bytes()[-4096:].decode("utf-8", "replace")
         except OSError:
             continue
         lines += [line.strip() for line in text.splitlines() if line.strip()]
-    # Yade greets on the stream of its errors, and all codes here write an ERROR to their output
+    # Yade prints a greeting to its errors, and all codes here print an ERROR to their output
     telling = [line for line in lines if line.startswith("ERROR")] or lines
-    return f"; its last words: {telling[-1][:TOLD]}" if telling else ""
+    return f"; its last line: {telling[-1][:SHOWN]}" if telling else ""
 
 
 def _remove_others(folder: Path, kept: set[str]) -> None:
@@ -273,7 +275,7 @@ def _remove_others(folder: Path, kept: set[str]) -> None:
 
 
 def empty_result(status: str, reason: str, provenance: dict[str, Any]) -> CaseResult:
-    """Result of a case that left no grains."""
+    """Build the result of a case without grains."""
     return CaseResult(
         status=status,
         reason=reason,

@@ -7,11 +7,11 @@ import numpy as np
 from dem_warp.walls import Mesh, Plane, Wall
 
 SEGMENTS = 180
-"""Sides of a round wall; its corners stand on the circle, its sides at most 0.02 % of the radius inside."""
+"""Sides of a round wall; they are at most 0.02 % of the radius inside the circle."""
 
 
 def triangles_of(wall: Wall, half_width: float) -> np.ndarray:
-    """Triangles of a wall [m], shape (n, 3, 3); an endless plane is a square of this half width [m]."""
+    """Return the triangles of a wall [m], (n, 3, 3); an endless plane is a square of this half width [m]."""
     if isinstance(wall, Mesh):
         return wall.vertices[wall.faces]
     origin, axis = np.array(wall.point), np.array(wall.axis)
@@ -30,7 +30,7 @@ def triangles_of(wall: Wall, half_width: float) -> np.ndarray:
 
 
 def _across(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors across an axis and each other."""
+    """Return two unit vectors, perpendicular to an axis and to each other."""
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     x = np.cross(helper, axis)
     x /= np.linalg.norm(x)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pyvista
 
 BEYOND = 1.2
-"""An endless plate is drawn as far as this many times the farthest grain."""
+"""Half width of an endless plate that is drawn, relative to the farthest grain."""
 
 AXES_OF_TENSOR = 9
 """Components of a matrix, row by row."""
@@ -48,14 +48,14 @@ def write_frames(film: Film, folder: Path) -> list[Path]:
                 save(_data_of(name, film, frame, half_width), temporary)
             rows.append((frame.time, place.as_posix()))
         written[folder / f"{name}.pvd"] = _collection(rows)
-    # last, so that a series that is there is whole
+    # last, so that a series that exists is whole
     for path, text in written.items():
         write_text(path, text)
     return list(written)
 
 
 def farthest(film: Film) -> float:
-    """Distance from the axis of the farthest point of a grain or of a wall with an end, in any frame [m]."""
+    """Return the distance from the axis of the farthest grain or finite wall, in any frame [m]."""
     reach = [wall.reach for wall in film.walls if np.isfinite(wall.reach)]
     for frame in film.frames:
         centers, radii, _ = film.spheres(frame)
@@ -64,7 +64,7 @@ def farthest(film: Film) -> float:
 
 
 def wall_triangles(film: Film, frame: Frame, wall: int, half_width: float) -> np.ndarray:
-    """Triangles of a wall as it stands in a frame [m], (n, 3, 3); an endless plate has a half width [m]."""
+    """Return the triangles of a wall in a frame [m], (n, 3, 3); an endless plate has a half width [m]."""
     origin, turn = frame.wall_poses[wall]
     point = np.array(film.walls[wall].point)
     return origin + (triangles_of(film.walls[wall], half_width) - point) @ _matrices(turn[None])[0].T
@@ -83,7 +83,7 @@ def _data_of(name: str, film: Film, frame: Frame, half_width: float) -> pyvista.
 
 
 def _spheres(film: Film, frame: Frame) -> pyvista.PolyData:
-    """One point a sphere; it moves as a point of its grain."""
+    """Build one point a sphere, which moves with its grain."""
     centers, radii, rows = film.spheres(frame)
     grains = frame.grains[rows]
     first = np.searchsorted(rows, rows)
@@ -99,7 +99,7 @@ def _spheres(film: Film, frame: Frame) -> pyvista.PolyData:
 
 
 def _grains(film: Film, frame: Frame) -> pyvista.PolyData:
-    """One point a grain, at its centre of mass, with the radius of a ball of its volume."""
+    """Build one point a grain, at its centre of mass, with the radius of a ball of its volume."""
     contacts, force = frame.contacts, np.zeros((len(film.sizes), 3))
     np.add.at(force, contacts.grains, contacts.forces)
     between = contacts.partners >= 0
@@ -118,7 +118,7 @@ def _grains(film: Film, frame: Frame) -> pyvista.PolyData:
 
 
 def _contacts(frame: Frame) -> pyvista.PolyData:
-    """One line a contact: from the centre of the grain that the force acts on, to its partner or the wall."""
+    """Build one line a contact, from the grain that the force acts on to its partner or the wall."""
     contacts = frame.contacts
     row = np.full(1 + max(frame.grains.max(initial=0), contacts.partners.max(initial=0)), -1)
     row[frame.grains] = np.arange(len(frame.grains))
@@ -151,7 +151,7 @@ def _collection(rows: list[tuple[float, str]]) -> str:
 
 
 def _matrices(quaternions: np.ndarray) -> np.ndarray:
-    """Rotation matrices, (n, 3, 3), of unit quaternions x y z w, (n, 4); columns are the body's axes."""
+    """Return rotation matrices, (n, 3, 3), of unit quaternions x y z w; columns are the body's axes."""
     x, y, z, w = quaternions.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

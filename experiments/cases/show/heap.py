@@ -1,20 +1,24 @@
-"""One case: simulated, measured, and written as spheres, as a picture of its heap, and as its numbers."""
+"""One case: simulated, measured, and written as spheres, as a picture of its heap, and as numbers."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+import shutil
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dem_warp import CaseResult, Film, Progress, simulate_frames
+from dem_warp import Case, CaseResult, Film, simulate_frames
+from dem_warp.result import OnProgress
+from experiments.cases.engines.engine import NO_ANSWER
 from experiments.cases.engines.engines import engine_of
 from experiments.cases.show.frames import write_frames
 from experiments.cases.show.movie import NO_MOVIE, write_movie
 from experiments.cases.show.polydata import poly, save
+from experiments.cases.store.store import Store
 from experiments.cases.workers.own import THIS_MACHINE, OwnWorkers
 from experiments.cases.workers.workers import Workers
 from experiments.io.errors import InputError
@@ -46,21 +50,21 @@ class Heap:
     scene: str = TARGET_SCENE
     """Name of its scene."""
     film: Film | None = None
-    """Frames of its course, where they were asked for and it could begin."""
+    """Frames of its course, if they were asked for and it could begin."""
 
     @property
     def angle(self) -> HeapAngle | None:
-        """Its angle; None when the case failed, there is no measurable heap, or the test leaves none."""
+        """Its angle; None if the case failed or left no measurable heap."""
         return self.observed.angle
 
     @property
     def reason(self) -> str:
-        """Reason that the case or the measurement failed; empty when neither did."""
+        """Reason that the case or the measurement failed; empty if both succeeded."""
         return self.observed.reason
 
     @property
     def filling(self) -> float | None:
-        """Part of the drum that its bed took; None of another test, or where it was not filled."""
+        """Part of the drum that its bed took; None for another test, or an unfilled drum."""
         scene = self.study.case(self.settings, self.seed, self.scene).scene
         return filling_reached(scene, self.result.observables)
 
@@ -101,25 +105,26 @@ def simulate_heap(
     settings: Mapping[str, float],
     seed: int,
     workers: Workers = THIS_MACHINE,
-    progress: Callable[[Progress], None] | None = None,
+    progress: OnProgress | None = None,
     scene: str = TARGET_SCENE,
     frames: int | None = None,
+    store: Store | None = None,
 ) -> Heap:
     """Simulate one case with the study's engine, and measure its heap.
 
     Settings, seed and scene are those of `Study.case`. With a number of `frames` its course is kept, and the
-    result is the same to the bit.
+    result is the same to the bit. A `store` keeps checkpoints and the result, which is not simulated again.
 
     Raises
     ------
     StudyError
         When there is no such factor or scene, or a value leaves what is physical.
     InputError
-        When frames are asked of another engine than dem-warp's own.
+        When frames are wanted and the engine is not dem-warp's own.
     """
     case, film = study.case(settings, seed, scene), None
     if frames is None:
-        [result] = workers.simulate([case], engine_of(study), on_progress=progress)
+        result = _result(study, case, workers, progress, store)
     else:
         result, film = simulate_frames(case, frames, filmed_by(study, workers).name, progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
@@ -127,13 +132,26 @@ def simulate_heap(
     return Heap(study, values, seed, result, observed, scene, film)
 
 
-def filmed_by(study: Study, workers: Workers) -> OwnWorkers:
-    """Return the workers, which must be of this machine and have dem-warp's own engine to keep frames.
+def _result(
+    study: Study, case: Case, workers: Workers, progress: OnProgress | None, store: Store | None
+) -> CaseResult:
+    if store is None:
+        [result] = workers.simulate([case], engine_of(study), on_progress=progress)
+        return result
+    key = store.key(case)
+    if store.has(key):
+        return store.load(key)
+    [result] = workers.simulate([case], store.engine, None, progress, store.unfinished)
+    if result.status != NO_ANSWER:
+        store.save(key, result)
+    shutil.rmtree(store.unfinished, ignore_errors=True)
+    return result
 
-    Raises
-    ------
-    InputError
-        When they do not.
+
+def filmed_by(study: Study, workers: Workers) -> OwnWorkers:
+    """Return the workers, which must be this machine's and have dem-warp's own engine to keep frames.
+
+    Raise InputError when they are not.
     """
     if engine_of(study) is not None:
         other = study.engine and (study.engine.name or study.engine.command)
@@ -144,7 +162,7 @@ def filmed_by(study: Study, workers: Workers) -> OwnWorkers:
 
 
 def heap_snapshot(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> Snapshot:
-    """Draw a heap as one of the views of its angle saw it."""
+    """Draw a heap from the camera of one of the views of its angle."""
     return snapshot(
         result.sphere_centers,
         result.sphere_radii,
@@ -157,10 +175,10 @@ def heap_snapshot(study: Study, result: CaseResult, angle: HeapAngle | None, vie
 def write_heap(heap: Heap, folder: Path, movie: str = "gif") -> None:
     """Write ``heap.vtp``, pictures and ``angle.json`` into a folder, made when it is missing.
 
-    ``snapshot.png`` has the fitted flanks drawn on it; ``snapshot-clean.png``, the same picture without them,
-    can be measured again. Frames, if there are any, come into the folder ``frames``, and as a film, of one of
-    `experiments.cases.show.movie.MOVIES`, beside it. Where no grain is left, as may be in a hopper, or a program's
-    answer cannot be drawn, there is no picture.
+    ``snapshot.png`` shows the fitted flanks; ``snapshot-clean.png`` is the same picture without them.
+    Frames, if there are any, are written into the folder ``frames``, with a film of a kind of
+    `experiments.cases.show.movie.MOVIES`. A test that leaves no grain, e.g. a hopper, has no
+    picture; neither has a program's answer that cannot be drawn.
     """
     if len(heap.result.positions):
         with replacing(folder / "heap.vtp") as temporary:

@@ -14,31 +14,24 @@ from imaging.drawing.film import Scenery, save_film
 
 NO_MOVIE = "none"
 MOVIES = ("gif", "mp4", NO_MOVIE)
-"""Kinds of films, the first of which is made where none is named."""
+"""Kinds of films, the default first."""
 
 MARGIN = 1.1
 """Room around what is shown."""
 
 STRAYS = 0.02
-"""Part of the last frame's spheres that may lie beside the picture."""
-
+"""Part of the last frame's spheres that may be outside the picture."""
 
 PICTURE_TIME = 0.08
-"""Time that each frame is shown [s]; when it was stands in the picture."""
+"""Time that each frame is shown [s]; its own time is written in the picture."""
 
 
 def require_movie(kind: str | None, frames: int | None) -> None:
-    """Refuse a kind of film that is none, and one without frames.
-
-    Raises
-    ------
-    InputError
-        With the rule.
-    """
+    """Raise InputError for an unknown kind of film, and for a film without frames."""
     if kind is None:
         return
     if frames is None:
-        raise InputError("--movie", "expected a film is made of frames: --frames N says of how many", kind)
+        raise InputError("--movie", "a film is made of frames", kind, "Add --frames N.")
     if kind not in MOVIES:
         raise InputError("--movie", f"must be one of {', '.join(MOVIES)}", kind)
 
@@ -59,7 +52,7 @@ def write_movie(film: Film, path: Path) -> None:
 
 
 def _scenery(film: Film) -> Scenery:
-    """Part of space that holds the walls at the start, and the grains at the end."""
+    """Return the part of space that holds the walls at the start and the grains at the end."""
     first, last = film.frames[0], film.frames[-1]
     centers, radii, _ = film.spheres(last)
     corners = [

@@ -1,6 +1,6 @@
 """Points, lines and triangles as ``.vtp`` files that ParaView and OVITO read.
 
-OVITO reads neither compressed files nor field data, so there are none.
+OVITO reads neither compressed files nor field data, so these files have none.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ def poly(
 
     Numbers are kept in single precision, counts as 32-bit integers.
     """
-    # PyVista is slow to import and absent on some machines that only calibrate.
+    # PyVista is slow to import, and missing on some machines that only calibrate
     import pyvista
     from vtkmodules.util.numpy_support import numpy_to_vtk
 
     data = pyvista.PolyData(points.astype(np.float32), **cells) if len(points) else pyvista.PolyData()
     for held, arrays in ((data.GetPointData(), of_points), (data.GetCellData(), of_cells)):
         for name, values in (arrays or {}).items():
-            # what has no points has the arrays too, which PyVista refuses
+            # data without points have the arrays, too, which PyVista refuses
             kind = np.float32 if values.dtype.kind == "f" else np.int32
             array = numpy_to_vtk(np.ascontiguousarray(values, dtype=kind), deep=True)
             array.SetName(name)

@@ -1,108 +1,53 @@
-"""The folder of a run: which study made it, whether a run may go on in it, one run at a time."""
+"""The folder of a run: which study made it, and whether a run may use it or continue in it."""
 
 from __future__ import annotations
 
 import logging
 import os
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
-
-from filelock import FileLock, Timeout
 
 from experiments.cases.engines.engines import engine_of
 from experiments.cases.store.outputs import changed_outputs
 from experiments.cases.store.store import Store
 from experiments.io.errors import StoreError
-from experiments.io.files import remove_leftovers
+from experiments.io.files import JOURNAL, LOCK
 from experiments.studyfile import Study
-from experiments.studyfile.manifest import MANIFEST, describe, differences, read_manifest, write_manifest
+from experiments.studyfile.manifest import describe, differences, read_manifest, write_manifest
 
 CASES = "cases"
 """Folder of the stored cases."""
 
-LOCK = ".lock"
-"""File that a run holds while it works in a folder; it stays beside results, and is none."""
-
-JOURNAL = ".live"
-"""Folder of what a run tells while it works; it stays, and is no result."""
-
 _log = logging.getLogger(__name__)
 
 
-@contextmanager
-def locked(folder: Path, resume: bool = False) -> Iterator[None]:
-    """Keep every other run out of a folder, which is made when it is missing and no run is to go on in it.
-
-    Raises
-    ------
-    StoreError
-        When another run is at work in it, or it is in use and not to be resumed, or there is nothing to
-        resume. Nothing is written then.
-    """
-    _require_usable(folder, resume)
-    lock, made = FileLock(folder / LOCK, timeout=0), not os.path.lexists(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock.acquire()
-    except Timeout:
-        raise StoreError(
-            str(folder), "expected one run at a time works in a folder", "another at work"
-        ) from None
-    except OSError as error:
-        rule = "a folder of results must be one that can be made and written to"
-        raise StoreError(str(folder), rule, error.strerror or "none") from error
-    try:
-        # another run may have come and gone since
-        _require_usable(folder, resume)
-        if resume:
-            remove_leftovers(folder)
-        yield
-    finally:
-        if made and not is_used(folder):
-            _take_away(folder)
-        lock.release()
-
-
-def _take_away(folder: Path) -> None:
-    """Remove a folder that holds a lock alone, so that a run that was refused leaves nothing."""
-    # another system may keep a file that is open, and another run may write into the folder just now
-    with suppress(OSError):
-        shutil.rmtree(folder / JOURNAL, ignore_errors=True)
-        (folder / LOCK).unlink()
-        folder.rmdir()
-
-
 def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store, list[str]]:
-    """Make a run's folder, or go on in an existing one.
+    """Make a run's folder, or continue in an existing one.
 
-    What an earlier run of another study left there, its ``study.json`` with it, stays until `publishing`
-    replaces all of it but what is stored by key.
+    Outputs of an earlier run, ``study.json`` with them, stay until `publishing` replaces them.
 
     Returns
     -------
     store
-        Store of the cases, which has the study's engine.
+        Store of the cases, with the study's engine.
     changes
         Differences from the study that the folder was made with, one line a key. Cases that a change does
-        not touch are used again: each is stored under all that determines it.
+        not affect are used again: each is stored under all that determines it.
 
     Raises
     ------
     StoreError
-        When the folder is in use and not to be resumed, or is no run's. Nothing is written then.
+        When the folder is not empty and not to be resumed, or is not a run's. Nothing is written then.
     StudyError
         When the study's engine cannot be used.
     """
     engine = engine_of(study)
-    _require_usable(folder, resume)
+    require_usable(folder, resume)
     changes: list[str] = []
     if resume:
         changes = list(differences(read_manifest(folder), describe(study)))
         for name in changed_outputs(folder):
             _require_file(folder / name, "an output")
-            said = "%s is not as the earlier run wrote it: what this run makes is written anew"
+            said = "%s has changed since the earlier run and will be overwritten"
             _log.warning(said, folder / name)
     else:
         write_manifest(folder, study)
@@ -110,44 +55,45 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
 
 
 def is_used(folder: Path) -> bool:
-    """Tell that a folder, or a file of that name, holds something."""
+    """Tell whether a folder, or a file of that name, holds anything of a run."""
     # pathlib raises where a name is too long for the system
     if not os.path.isdir(folder):
         return os.path.lexists(folder)
     return any(path.name not in (LOCK, JOURNAL) for path in folder.iterdir())
 
 
-def require_unused(folder: Path, advice: str = "") -> None:
+def require_unused(folder: Path, hint: str = "") -> None:
     """Refuse a folder that holds something, so that nothing is overwritten.
 
-    Raises
-    ------
-    StoreError
-        When the folder is not new or empty.
+    Raise StoreError when the folder is not new or empty.
     """
-    if is_used(folder):
-        raise StoreError(str(folder), f"the output folder must be new or empty{advice}", _kind(folder))
+    if os.path.isdir(folder):
+        if is_used(folder):
+            raise StoreError(str(folder), "the folder is not empty", hint=hint)
+    elif os.path.lexists(folder):
+        raise StoreError(str(folder), "must be a folder", _kind(folder))
 
 
-def _require_usable(folder: Path, resume: bool) -> None:
+def require_usable(folder: Path, resume: bool) -> None:
+    """Refuse a used folder for a new run, and one that is not a run's for a run that continues.
+
+    Raise StoreError with the problem.
+    """
     if not resume:
-        require_unused(folder, "; --resume goes on in it")
+        require_unused(folder, "Add --resume to continue that run.")
     elif not is_used(folder):
-        rule = "a folder to resume must be that of an earlier run: without --resume, a new one is made"
-        raise StoreError(str(folder), rule, "none" if not folder.exists() else "an empty one")
+        problem = "the folder is empty" if folder.is_dir() else "no such folder"
+        raise StoreError(str(folder), problem, hint="Leave out --resume to begin a new run.")
     elif not folder.is_dir():
-        raise StoreError(str(folder), f"a folder to resume must hold a {MANIFEST}", _kind(folder))
+        raise StoreError(str(folder), "must be a folder", _kind(folder))
     else:
         _require_no_links(folder)
         _require_stored_cases(folder)
         read_manifest(folder)
 
 
-def _kind(folder: Path) -> str:
-    """Say what stands in the place of a new folder."""
-    if os.path.isdir(folder):
-        return "a used one"
-    return "a file" if os.path.exists(folder) else "a link that leads nowhere"
+def _kind(place: Path) -> str:
+    return "a file" if os.path.exists(place) else "a broken link"
 
 
 def _require_no_links(folder: Path) -> None:
@@ -155,13 +101,13 @@ def _require_no_links(folder: Path) -> None:
     for place, folders, files in os.walk(folder):
         for name in (*folders, *files):
             if (path := Path(place, name)).is_symlink():
-                raise StoreError(str(path), "a folder to resume must hold no links", "a link")
+                raise StoreError(str(path), "a folder to resume must hold no links")
 
 
 def _require_stored_cases(folder: Path) -> None:
     """Refuse what a case could not be saved over, before it is simulated."""
     if os.path.lexists(cases := folder / CASES) and not cases.is_dir():
-        raise StoreError(str(cases), "must be the folder of the stored cases: move it away", "a file")
+        raise StoreError(str(cases), "must be the folder of the stored cases", "a file", "Move it away.")
     for place in (folder, cases):
         for path in place.glob("*.npz"):
             _require_file(path, "a stored case" if place == cases else "a bank")
@@ -170,4 +116,4 @@ def _require_stored_cases(folder: Path) -> None:
 def _require_file(path: Path, what: str) -> None:
     if os.path.lexists(path) and not path.is_file():
         found = "a folder" if path.is_dir() else "a pipe or a device"
-        raise StoreError(str(path), f"must be the file of {what}: move it away", found)
+        raise StoreError(str(path), f"must be the file of {what}", found, "Move it away.")

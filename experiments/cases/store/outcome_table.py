@@ -20,42 +20,43 @@ _SCHEMA = (
 )
 _COLUMNS = ["key", "numbers", "reason", "digest"]
 _AT_ONCE = 500
-"""Keys that one query asks for; SQLite takes some thousand."""
+"""Keys of one query; SQLite takes some thousand."""
 
 _PATIENCE = 60.0
 """Time that a process waits for others that write to the file [s]."""
 
 Outcome = tuple[np.ndarray, str]
-"""Observables of a case, and why it has none; empty where it has."""
+"""Observables of a case, and the reason if it has none, else an empty text."""
 
 _log = logging.getLogger(__name__)
 
 
 class OutcomeTable:
-    """A table of outcomes in a file.
+    """A table of outcomes in a file, which is made when the first row is saved.
 
-    Rows are written in transactions: a run that is killed loses none that it has saved, and leaves none half.
-    Each has a digest of all of it: one that was changed since counts as absent. The file is made when the
-    first row is saved.
+    Rows are written in transactions: a run that is killed loses no saved row and leaves no half row. Each has
+    a digest; a row that was changed counts as missing.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
 
+    @property
+    def unfinished(self) -> Path:
+        """Folder of the checkpoints of cases that are being simulated."""
+        return self.path.with_name("unfinished")
+
     def __len__(self) -> int:
-        """Number of rows."""
+        """Count the rows."""
         if not self.path.exists():
             return 0
         with self._opened() as file:
             return int(file.execute("SELECT count(*) FROM outcome").fetchone()[0])
 
     def load(self, keys: Sequence[str]) -> dict[str, Outcome]:
-        """Outcomes by key, of those keys that are there.
+        """Return outcomes by key, for the keys that the table has.
 
-        Raises
-        ------
-        StoreError
-            When the file is no such table.
+        Raise StoreError when the file is not such a table.
         """
         if not self.path.exists():
             return {}
@@ -76,10 +77,7 @@ class OutcomeTable:
     def save(self, outcomes: Mapping[str, Outcome]) -> None:
         """Save outcomes by key, all of them or none; earlier ones of the same keys are replaced.
 
-        Raises
-        ------
-        StoreError
-            When the file is no such table, or cannot be written.
+        Raise StoreError when the file is not such a table, or cannot be written.
         """
         self.path.parent.mkdir(parents=True, exist_ok=True)
         rows = [(key, np.asarray(row, "<f8").tobytes(), reason) for key, (row, reason) in outcomes.items()]
@@ -89,12 +87,12 @@ class OutcomeTable:
 
     @contextmanager
     def _opened(self) -> Iterator[sqlite3.Connection]:
-        """Open the file; whatever SQLite finds wrong with it is a `StoreError`."""
+        """Open the file; turn errors of SQLite into `StoreError`."""
         try:
             if self.path.exists() and not self.path.is_file():
-                raise sqlite3.DatabaseError("it is no regular file")
+                raise sqlite3.DatabaseError("it is not a regular file")
             with closing(sqlite3.connect(self.path, _PATIENCE)) as file:
-                # a text that is no UTF-8 is a damaged row, not an error
+                # a text that is not UTF-8 is a damaged row, not an error
                 file.text_factory = lambda text: text.decode(errors="replace")
                 file.execute(_SCHEMA)
                 columns = [name for _, name, *_ in file.execute("PRAGMA table_info(outcome)")]
@@ -102,17 +100,15 @@ class OutcomeTable:
                     raise sqlite3.DatabaseError(f"its columns are {', '.join(columns)}")
                 yield file
         except sqlite3.OperationalError as error:
-            rule = (
-                "the table of outcomes must be one that can be read and written: see to room and permissions"
-            )
-            raise StoreError(str(self.path), rule, str(error)) from error
-        except (sqlite3.Error, UnicodeDecodeError) as error:  # of a damaged name in a message
-            rule = "must be a table of outcomes that this version wrote: move it away, and they are made anew"
-            raise StoreError(str(self.path), rule, str(error)) from error
+            hint = "Check disk space and permissions."
+            raise StoreError(str(self.path), f"cannot be read or written: {error}", hint=hint) from error
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # a damaged name in a message
+            hint = "Move it away; its cases are simulated again."
+            raise StoreError(str(self.path), f"is not a table of outcomes: {error}", hint=hint) from error
 
 
 def _whole(row: Sequence[Any]) -> Outcome | None:
-    """Outcome of a row; None where the row is not as it was saved."""
+    """Return the outcome of a row; None if the row has changed since it was saved."""
     key, numbers, reason, digest = row
     if tuple(map(type, row)) != (str, bytes, str, bytes) or digest != _digest(key, numbers, reason):
         return None
@@ -121,5 +117,5 @@ def _whole(row: Sequence[Any]) -> Outcome | None:
 
 def _digest(key: str, numbers: bytes, reason: str) -> bytes:
     parts = (key.encode(), numbers, reason.encode())
-    # the lengths tell where one part ends
+    # the lengths separate the parts
     return hashlib.sha256(b"".join(len(part).to_bytes(8) + part for part in parts)).digest()

@@ -1,9 +1,9 @@
 """The files that a run leaves in its folder: all of one study, and listed last with their hashes.
 
-Reports, tables and cards are written beside the folder's own files, in drafts, and moved to their places when
-the run has come to its end. So a run that is stopped leaves the earlier outputs as they were, and one that
-ends leaves none of another study beside its own. What runs look up by a key that holds all that determines a
-result, the stored cases and a search's table of outcomes, is no output: it serves any study, and stays.
+Reports, tables and cards are written as drafts, and moved to their places at the end of the run. A run that
+is stopped leaves the earlier outputs as they were, and one that ends leaves no output of another study. The
+stored cases and a search's table of outcomes are no outputs: their keys hold all that determines a result, so
+that they serve any study, and stay.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from experiments.studyfile import Study
 from experiments.studyfile.manifest import LARGEST, study_hash, write_manifest
 
 LIST = "files.json"
-"""File that names every output, with its hash and with what all of them were made from."""
+"""File with the hash of every output, and with what all of them were made from."""
 
 DRAFTS = ".drafts"
 """Folder of outputs that are being written."""
@@ -33,18 +33,18 @@ DRAFTS = ".drafts"
 def publishing(
     folder: Path, study: Study, lasting: Mapping[str, bool] | None = None, **made_from: object
 ) -> Iterator[Path]:
-    """Hand out a folder for drafts, and make them the outputs of a run's folder when the block ends well.
+    """Yield a folder for drafts, which become the outputs of a run's folder when the block ends well.
 
     Parameters
     ----------
     folder
         Folder of the run.
     lasting
-        Files of the folder that last over its runs, by name, each with whether it serves the study: it then
-        stays and is listed, whatever the run is made from. One that does not is removed.
+        Files that the runs of the folder share, by name: one that serves the study (True) stays and is
+        listed, one that does not is removed.
     study, made_from
-        Study of the outputs, and whatever else they follow from, as JSON-able data. Earlier outputs that were
-        made from the same stay, save those that are written anew; those made from anything else are removed.
+        Study of the outputs, and JSON-able data that determines them, too. Earlier outputs that were made
+        from the same stay, if they are not overwritten; others are removed.
     """
     drafts = folder / DRAFTS
     shutil.rmtree(drafts, ignore_errors=True)
@@ -59,18 +59,18 @@ def publishing(
 
 
 def is_listed(folder: Path, name: str) -> bool:
-    """Tell that the list of a folder's outputs names a file."""
+    """True if the list of a folder's outputs names a file."""
     return name in _read_list(folder)["files"]
 
 
 def changed_outputs(folder: Path) -> list[str]:
-    """Name the listed outputs that are gone or are not what the run wrote."""
+    """Return the names of listed outputs that are missing or have changed."""
     files = _read_list(folder)["files"]
     return [name for name, known in files.items() if known and sha256_of(folder / name) != known]
 
 
 def sha256_of(path: Path) -> str | None:
-    """SHA-256 of a file; None where there is none."""
+    """Return the SHA-256 of a file; None if it is missing."""
     if not path.is_file():
         return None
     with path.open("rb") as file:
@@ -78,7 +78,7 @@ def sha256_of(path: Path) -> str | None:
 
 
 def _publish(drafts: Path, folder: Path, made_from: dict[str, Any], lasting: Mapping[str, bool]) -> None:
-    """Move drafts to their places; the list names every file from before the first move on."""
+    """Move drafts to their places, after every file was listed."""
     earlier = _read_list(folder)
     old, drawn = earlier["files"], sorted(path for path in drafts.rglob("*") if path.is_file())
     new = {path.relative_to(drafts).as_posix(): sha256_of(path) for path in drawn}
@@ -119,13 +119,13 @@ def _read_list(folder: Path) -> dict[str, Any]:
             return {"made_from": made_from, "files": files}
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         pass
-    rule = "must be the list of files that a run wrote: move it away, with the outputs that it should name"
-    raise StoreError(str(path), rule, "another file")
+    hint = "Move it away, with the outputs that it should name."
+    raise StoreError(str(path), "must be the list of files that a run wrote", "another file", hint)
 
 
 def _place(folder: Path, name: str) -> Path:
-    """Place of an output; a name that leads out of the folder is an error."""
+    """Return the place of an output; raise ValueError if it is outside the folder."""
     parts = PurePosixPath(name).parts
     if not parts or ".." in parts or PurePosixPath(name).is_absolute():
-        raise ValueError(f"an output lies in the run's folder, not at {name!r}")
+        raise ValueError(f"name must be in the run's folder, got {name!r}")
     return folder.joinpath(*parts)

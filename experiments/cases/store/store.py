@@ -25,15 +25,15 @@ _RECORD = "record"
 class Store:
     """Results of cases in a folder.
 
-    A case's file is written whole or not at all, and its checksums are verified when it is read. The folder
-    is made when the first case is saved; without an engine, results are those of `dem_warp.simulate`.
+    The file of a case is written whole or not at all, and its checksums are verified when it is read. The
+    folder is made when the first case is saved; without an engine, results are `dem_warp.simulate`'s.
     """
 
     def __init__(self, folder: str | Path, engine: Engine | None = None) -> None:
         self.folder, self.engine = Path(folder), engine
 
     def key(self, case: Case) -> str:
-        """Key of a case: a hash of all that determines its result and how it is stored."""
+        """Return the key of a case: a hash of all that determines its stored result."""
         return case_key(case, self.engine, format=FORMAT)
 
     @property
@@ -42,19 +42,19 @@ class Store:
         return self.folder / "unfinished"
 
     def path(self, key: str) -> Path:
-        """File of a case."""
+        """Return the file of a case."""
         return self.folder / f"{key}.npz"
 
     def __len__(self) -> int:
-        """Number of cases stored."""
+        """Count the stored cases."""
         return len(list(self.folder.glob("*.npz")))
 
     def has(self, key: str) -> bool:
-        """Tell that the case is stored and whole."""
+        """True if the case is stored and whole."""
         return self.path(key).is_file() and self.damage(key) is None
 
     def damage(self, key: str) -> str | None:
-        """Fault of a stored case; None when it is whole or absent."""
+        """Return the fault of a stored case; None if it is whole or missing."""
         if not self.path(key).exists():
             return None
         try:
@@ -81,15 +81,13 @@ class Store:
     def load(self, key: str) -> CaseResult:
         """Load the result of a case.
 
-        Raises
-        ------
-        StoreError
-            When the case is not stored, or its file is damaged.
+        Raise StoreError when the case is not stored, or its file is damaged.
         """
         path = self.path(key)
         if not path.is_file():
-            rule = "a stored case must stay until the run has ended: --resume simulates it again"
-            raise StoreError(str(path), rule, "no such file")
+            raise StoreError(
+                str(path), "this stored case was removed", hint="Add --resume to simulate it again."
+            )
         try:
             values = _read_values(path)
             found = (values.pop("key"), values.pop("format"))
@@ -99,7 +97,7 @@ class Store:
             _check(result)
             return result
         except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-            raise StoreError(str(path), "a stored case must be whole", f"a damaged file: {error}") from error
+            raise StoreError(str(path), f"this stored case is damaged: {error}") from error
 
 
 def _read_values(path: Path) -> dict[str, Any]:
@@ -108,7 +106,7 @@ def _read_values(path: Path) -> dict[str, Any]:
 
 
 def _check(result: CaseResult) -> None:
-    """See to it that the arrays of a result fit each other."""
+    """Raise ValueError if the arrays of a result do not fit each other."""
     count, shapes = len(result.sizes), len(result.clumps)
     found = (result.positions.shape, result.orientations.shape, result.sizes.shape, result.shapes.shape)
     if found != ((count, 3), (count, 4), (count,), (count,)) or result.clumps.shape[2:] != (4,):
@@ -116,7 +114,7 @@ def _check(result: CaseResult) -> None:
     if count and not 0 <= result.shapes.min() <= result.shapes.max() < shapes:
         raise ValueError(f"its grains have other shapes than its {shapes}")
     if not (isinstance(result.status, str) and isinstance(result.observables, dict)):
-        raise ValueError("its status or its observables are none")
+        raise ValueError("its status or its observables are invalid")
     places = (result.positions, result.orientations, result.sizes, result.clumps)
     if result.status == "finished" and not all(np.isfinite(values).all() for values in places):
-        raise ValueError("it has finished, and some of its places and sizes are no finite numbers")
+        raise ValueError("some of its places and sizes are not finite")

@@ -1,4 +1,4 @@
-"""Batches: which cases run in one launch, so that a device is full and workers end together."""
+"""Batches: cases that run in one launch, chosen so that a device is full and workers end together."""
 
 from __future__ import annotations
 
@@ -16,21 +16,20 @@ from dem_warp.simulation import batches
 from experiments.cases.forecast.work import work_of
 
 WORLDS = 1024
-"""Worlds that one launch on a GPU holds at the most: few enough that a killed run loses little."""
+"""Worlds of one launch on a GPU, at most: few enough that a killed run loses little."""
 
 FULL_GRAINS = 330_000
-"""Grains with which a large GPU reaches 95 % of its speed (`experiments/evidence/performance/README.md`, cost)."""
+"""Grains with which a large GPU reaches 95 % of its speed (evidence/performance/README.md, cost)."""
 
 GPU_WORKERS = 2
-"""Workers of a GPU, each with a launch of its own in a process of its own, where workers are processes that
-are started here: while the host makes the worlds of one launch, looks at them or sends their results, another
-has the GPU. One GPU without a cluster has one, this process."""
+"""Worker processes of a GPU, each with its own launch: while the host makes the worlds of one launch or sends
+their results, another uses the GPU. One GPU without a cluster has one worker, this process."""
 
 IDLE_SPHERES = 100.0
 """Spheres that cost as much as a step without any."""
 
 MEMORY_SHARE = 0.8
-"""Part of a device's free memory that the worlds of a launch may take, by what is predicted of them."""
+"""Part of a device's free memory that the worlds of a launch may take, as predicted."""
 
 
 def plan_batches(
@@ -49,15 +48,14 @@ def plan_batches(
     workers : int
         Workers that take the batches.
     memory : float, optional
-        Free memory that a GPU has for each of its workers [bytes]; None: of workers on CPUs, which simulate
-        one case at a time.
+        Free memory of a GPU for each of its workers [bytes]; None: CPUs, which simulate one case at a time.
     sharing : int
         Workers that share a GPU.
 
     Returns
     -------
     list of list of int
-        Indices of the cases of each batch. On a GPU these share all that kernels are compiled for.
+        Indices of the cases of each batch; on a GPU, cases of the same kernels.
     """
     if memory is None:
         return [[int(index)] for index in _falling(costs)]
@@ -73,27 +71,27 @@ def plan_batches(
 
 
 def rounds_of(count: int, grains: float, workers: int, most: int = WORLDS, sharing: int = 1) -> int:
-    """Rounds of a launch a worker, in which so many worlds, of so many grains in all, are simulated.
+    """Return the rounds, of a launch a worker, for `count` worlds of `grains` in all.
 
     The launches of the workers that share a GPU fill it together as nearly as they can, since the last world
-    of each runs alone at the end. A launch holds `most` worlds at the most.
+    of each runs alone at the end. A launch holds at most `most` worlds.
     """
     full = FULL_GRAINS / sharing
     return max(round(grains / (workers * full)), math.ceil(count / (workers * most)), 1)
 
 
 def _worlds_held(largest: Case, memory: float) -> int:
-    """Worlds no larger than a case that so much memory holds [bytes], `WORLDS` at the most."""
+    """Return the number of worlds as large as a case that fit into memory [bytes], at most `WORLDS`."""
     return max(min(int(MEMORY_SHARE * memory / device_bytes(largest)), WORLDS), 1)
 
 
 def _falling(costs: np.ndarray) -> np.ndarray:
-    """Places of the costs from the highest on, equal ones in their order."""
+    """Return the places of the costs, the highest first, equal ones in their order."""
     return np.argsort(-costs, kind="stable")
 
 
 def _dealt(members: np.ndarray, rounds: int, workers: int) -> list[list[int]]:
-    """Deal members out in rounds of a batch a worker; in each round all batches cost much the same."""
+    """Deal members out in rounds of a batch a worker; the batches of a round cost much the same."""
     parts = np.array_split(members, rounds)
     return [part[w::workers].tolist() for part in parts for w in range(min(workers, len(part)))]
 

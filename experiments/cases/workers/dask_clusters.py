@@ -1,4 +1,4 @@
-"""Clusters that are started for a run; their connections are encrypted, with keys made for them."""
+"""Clusters that are started for a run, with encrypted connections."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from distributed import SpecCluster
 
 LOOK = 0.5
-"""Time between two looks at a cluster whose jobs are being submitted [s]."""
+"""Time between two checks of a cluster whose jobs are being submitted [s]."""
 
 _log = logging.getLogger(__name__)
 
 
 def start_processes(gpus: list[str], count: int) -> SpecCluster:
-    """Start so many workers on this machine: dealt out to GPUs, each sees one, or without them sees none."""
+    """Start `count` workers on this machine; each sees one of the GPUs, or no GPU if there are none."""
     from distributed import Nanny, Scheduler, Security, SpecCluster
 
     common = {"host": "127.0.0.1", "protocol": "tls://", "security": Security.temporary()}
@@ -48,7 +48,7 @@ def start_processes(gpus: list[str], count: int) -> SpecCluster:
 
 
 def visible(gpus: list[str]) -> list[str]:
-    """Value of CUDA_VISIBLE_DEVICES for each GPU, where this process may see some only."""
+    """Return the value of CUDA_VISIBLE_DEVICES for each GPU; this process may see only some."""
     seen = [name for name in os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",") if name]
     numbers = [int(name.removeprefix("cuda:")) for name in gpus]
     return [seen[number] if seen else str(number) for number in numbers]
@@ -56,12 +56,9 @@ def visible(gpus: list[str]) -> list[str]:
 
 @contextmanager
 def submitted_jobs(section: ClusterSection, count: int) -> Iterator[tuple[JobQueueCluster, Submissions]]:
-    """Submit jobs that are workers, and end them; one that is ended while there is work is submitted again.
+    """Submit jobs that are workers, and end them; a job that is ended during the work is submitted again.
 
-    Raises
-    ------
-    InputError
-        When the command that submits them is not here, or the batch system refuses all of them.
+    Raise InputError when the command that submits them is missing, or the batch system refuses all of them.
     """
     require_submit_command(section)
     from distributed import Security
@@ -77,14 +74,14 @@ def submitted_jobs(section: ClusterSection, count: int) -> Iterator[tuple[JobQue
         cluster.adapt(minimum=count, maximum=count)
         _await_an_answer(cluster, submissions)
         if refusal := submissions.refusal:
-            rule = f"jobs must be taken by {submit_command(section.kind)}, which says: {refusal}"
-            value = f"kind {section.kind}, queue {section.queue or 'left out'}"
-            raise InputError("cluster", rule, value)
+            problem = f"{submit_command(section.kind)} refuses the jobs: {refusal}"
+            value = f"kind {section.kind}, queue {section.queue or 'default'}"
+            raise InputError("cluster", problem, value)
         yield cluster, submissions
 
 
 def _await_an_answer(cluster: JobQueueCluster, submissions: Submissions) -> None:
-    """Wait until the batch system takes a first job or has refused all."""
+    """Wait until the batch system has taken a job or refused all."""
     from distributed import Status
 
     while not submissions.decided.wait(LOOK):
@@ -93,7 +90,7 @@ def _await_an_answer(cluster: JobQueueCluster, submissions: Submissions) -> None
 
 
 def job_options(section: ClusterSection) -> dict[str, Any]:
-    """Options of dask-jobqueue for jobs of a section; their folder is made."""
+    """Return the options of dask-jobqueue for the jobs of a section, and make their folder."""
     from dask.utils import format_bytes, parse_bytes
 
     shared, each = Path(section.shared).expanduser(), section.workers_per_job

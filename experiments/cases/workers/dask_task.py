@@ -19,12 +19,12 @@ from dem_warp import Case, CaseResult, Progress
 from dem_warp.device import resolve_device
 from dem_warp.provenance import engine_fingerprint
 from experiments.cases.engines.engine import Engine
-from experiments.cases.workers.outbox import Outbox
 from experiments.cases.workers.own import OwnWorkers
+from experiments.cases.workers.send_queue import SendQueue
 from experiments.io.errors import InputError
 
 PATIENCE = 120.0
-"""Time that a worker waits for the client's word before it takes it for gone [s]."""
+"""Time that a worker waits for an answer before it gives up on the client [s]."""
 
 REPORT_EVERY = 2.0
 """Time between two reports of a worker [s]."""
@@ -35,11 +35,11 @@ _one_at_a_time = threading.Lock()
 _claiming = threading.Lock()
 
 _own: list[tuple[str, FileLock | None]] = []
-"""Device of this process, and what keeps others from it."""
+"""Device of this process, and the lock on it."""
 
 
 class GoneError(Exception):
-    """Nobody waits for the batch any more."""
+    """The client does not wait for the batch any more."""
 
 
 @dataclass(frozen=True)
@@ -56,25 +56,25 @@ class Order:
     checkpoint: str | None
     """Folder of checkpoints; one that this machine does not see is not used."""
     fingerprint: str
-    """Engine of the client, whose meaning the worker's must have."""
+    """Fingerprint of the client's engine, which must be the worker's."""
 
 
 @dataclass(frozen=True)
 class Message:
-    """Word of a worker about a batch."""
+    """Message of a worker about a batch."""
 
     number: int
     reply: str = ""
-    """Of a beginning: name of the queue that the answer goes to, the places of the cases still wanted."""
+    """Name of the queue for the answer, the places of the cases still wanted; sent at the beginning."""
     index: int = 0
     result: CaseResult | None = None
-    """Of a case that has ended, its place in the batch and its result."""
+    """After a case has ended: its place in the batch, and its result."""
     progress: Progress | None = None
-    """Of those that were wanted."""
+    """Progress of the cases that were wanted."""
 
 
 def simulate_batch(order: Order) -> None:
-    """Simulate those cases of a batch that the client still wants, and send each result as it ends.
+    """Simulate the cases of a batch that the client still wants, and send each result as it ends.
 
     Raises
     ------
@@ -86,18 +86,18 @@ def simulate_batch(order: Order) -> None:
     from distributed import Queue, get_worker
 
     if fingerprint_of(order.cases) != order.fingerprint:
-        rule = "workers must have the same dem-warp as the one that gives the orders"
-        raise InputError("the cluster", rule, f"another version on {get_worker().address}")
+        problem = "each worker must have the dem-warp of this machine"
+        raise InputError("the cluster", problem, f"another version on {get_worker().address}")
     with _one_at_a_time:
-        line = _Line(order, Queue(order.channel), get_worker())
-        wanted = line.ask()
+        client = _ToClient(order, Queue(order.channel), get_worker())
+        wanted = client.ask()
         folder = order.checkpoint
-        with line.outbox:
+        with client.outgoing:
             OwnWorkers(own_device(), 1, notes_speed=False).simulate(
                 [order.cases[index] for index in wanted],
                 order.engine,
-                lambda number, result: line.send(index=wanted[number], result=result),
-                line.report,
+                lambda number, result: client.send(index=wanted[number], result=result),
+                client.report,
                 folder if folder and Path(folder).is_dir() else None,
             )
 
@@ -107,18 +107,18 @@ def fingerprint_of(cases: Sequence[Case]) -> str:
     return engine_fingerprint(*dict.fromkeys(kind for case in cases for kind in case.kinds))
 
 
-class _Line:
-    """The way from a worker to the client.
+class _ToClient:
+    """Messages from a worker to the client.
 
-    The scheduler takes some milliseconds for a message, in which a GPU would stand still: so the outbox sends
-    what the simulation says, while it goes on.
+    The scheduler takes some milliseconds for a message, in which a GPU would idle: a queue sends them while
+    the simulation continues.
     """
 
     def __init__(self, order: Order, queue: Any, worker: Any) -> None:
         self._order, self._queue, self._worker = order, queue, worker
         self._task = worker.get_current_task()
         self._reported = time.monotonic()
-        self.outbox = Outbox(self._put)
+        self.outgoing = SendQueue(self._put)
 
     def ask(self) -> list[int]:
         """Ask which cases are wanted: another worker may have sent some before it was lost."""
@@ -133,26 +133,26 @@ class _Line:
         finally:
             reply.close()
 
-    def send(self, **said: Any) -> None:
-        """Leave a message to the outbox; GoneError where nobody listens."""
+    def send(self, **content: Any) -> None:
+        """Put a message into the queue; raise GoneError if the batch was cancelled."""
         task = self._worker.state.tasks.get(self._task)
         if task is None or task.state == "cancelled":
-            raise GoneError("the batch was taken back")
-        self.outbox.give(Message(self._order.number, **said))
+            raise GoneError("the batch was cancelled")
+        self.outgoing.put(Message(self._order.number, **content))
 
     def _put(self, messages: list[Message]) -> None:
-        """Send messages as one, and wait until the scheduler has it."""
+        """Send messages as one, and wait until the scheduler has them."""
         self._queue.put(pickle.dumps(messages))
 
     def report(self, progress: Progress) -> None:
-        """Send how far the batch is, now and then."""
+        """Send the progress of the batch, if the last report is old enough."""
         if time.monotonic() - self._reported >= REPORT_EVERY:
             self._reported = time.monotonic()
             self.send(progress=progress)
 
 
 def own_device() -> str:
-    """Device of this process: a GPU that no other worker of this machine has, or the CPU."""
+    """Return the device of this process: a GPU that no other worker of this machine has, or the CPU."""
     with _claiming:
         if not _own:
             resolve_device(None)
@@ -161,7 +161,7 @@ def own_device() -> str:
 
 
 def _claimed(gpus: Iterable[tuple[str, str]]) -> tuple[str, FileLock | None]:
-    """Claim the first GPU that is free; where all are taken, the first is shared."""
+    """Lock the first GPU that is free; if all are taken, the first is shared."""
     names = []
     for name, identity in gpus:
         names.append(name)
@@ -175,7 +175,7 @@ def _claimed(gpus: Iterable[tuple[str, str]]) -> tuple[str, FileLock | None]:
 
 
 def describe_worker() -> dict[str, Any]:
-    """Device of this worker; of a GPU, which others may share, its identity and free memory [bytes]."""
+    """Describe the device of this worker: a GPU, which others may share, with its free memory [bytes]."""
     name = own_device()
     on_gpu = name != "cpu"
     device = wp.get_device(name)

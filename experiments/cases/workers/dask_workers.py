@@ -1,4 +1,4 @@
-"""Workers of Dask: batches of cases as tasks, results stored here as they end, lost batches given again."""
+"""Workers of Dask: batches of cases as tasks, results stored here as they end, lost batches repeated."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines.engine import Engine
 from experiments.cases.forecast.speed import expected_seconds, note_batch
 from experiments.cases.workers.batches import plan_batches
+from experiments.cases.workers.call_results import CallResults
 from experiments.cases.workers.dask_task import (
     Message,
     Order,
@@ -26,7 +27,6 @@ from experiments.cases.workers.dask_task import (
     simulate_batch,
 )
 from experiments.cases.workers.submissions import Submissions
-from experiments.cases.workers.wave import Wave
 from experiments.cases.workers.workers import WorkersLostError
 from experiments.io.errors import InputError
 
@@ -34,20 +34,20 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 LISTEN = 0.5
-"""Time between two looks at what has become of the batches [s]."""
+"""Time between two checks of the batches [s]."""
 
 AHEAD = 4
-"""Batches a worker that the scheduler holds at once; the others wait here and take none of its memory."""
+"""Batches a worker that the scheduler holds at once; the others wait here and take no memory of it."""
 
-GONE = "the connection to the scheduler was lost: see to it that it runs on."
-"""Message where a scheduler does not answer any more."""
+GONE = "the connection to the scheduler was lost: check that it is still running."
+"""Message about a scheduler that does not answer any more."""
 
 _log = logging.getLogger(__name__)
 
 
 @contextmanager
-def _in_words() -> Iterator[None]:
-    """Say in words that a scheduler is gone, which Dask tells as an error of the system."""
+def _lost_scheduler() -> Iterator[None]:
+    """Turn Dask's connection error into WorkersLostError."""
     from distributed.comm import CommClosedError
 
     try:
@@ -68,9 +68,9 @@ class DaskWorkers:
     machine
         Name under which its speed is stored.
     expected : int, optional
-        Workers that were asked for; None: those that are there.
+        Workers that were asked for; default: those that are connected.
     submissions : Submissions, optional
-        What became of the jobs that are the workers.
+        Fate of the jobs that are the workers.
     """
 
     def __init__(
@@ -86,12 +86,12 @@ class DaskWorkers:
 
     @property
     def count(self) -> int:
-        """Workers that are asked for, or there."""
-        return self._expected or max(len(self._there()), 1)
+        """Workers that were asked for, or are connected."""
+        return self._expected or max(len(self._connected()), 1)
 
     @property
     def on_gpu(self) -> bool:
-        """Tell that the workers have GPUs."""
+        """True if the workers have GPUs."""
         return self._shares() is not None
 
     @property
@@ -107,7 +107,7 @@ class DaskWorkers:
 
     @property
     def leaves_cores(self) -> bool:
-        """Tell that they leave the cores of this machine to those who measure."""
+        """True if the cores of this machine are free for measuring: yes."""
         return True
 
     @property
@@ -115,7 +115,7 @@ class DaskWorkers:
         """Kind, place and number of the workers."""
         return self._described | {"workers": self.count}
 
-    @_in_words()
+    @_lost_scheduler()
     def simulate(
         self,
         cases: Sequence[Case],
@@ -131,43 +131,45 @@ class DaskWorkers:
         if not cases:
             return []
         self._await_workers()
-        wave = Wave(cases, on_result, on_progress, None if engine else expected_seconds(cases, self))
+        expected = None if engine else expected_seconds(cases, self)
+        results = CallResults(cases, on_result, on_progress, expected)
         shares = self._shares() if engine is None else None
-        batches = plan_batches(cases, wave.costs, self.count, *(shares or ()))
+        batches = plan_batches(cases, results.costs, self.count, *(shares or ()))
         if checkpoint is not None:
             Path(checkpoint).mkdir(parents=True, exist_ok=True)
         folder = None if checkpoint is None else str(Path(checkpoint).resolve())
-        session = _Session(self._client, wave, cases, engine, folder, self._submissions)
+        session = _Session(self._client, results, cases, engine, folder, self._submissions)
         try:
             session.run(batches, AHEAD * self.count)
         finally:
             session.close()
         if engine is None:
-            note_batch(cases, self, *wave.pace)
-        return wave.in_order()
+            note_batch(cases, self, *results.pace)
+        return results.in_order()
 
-    def _there(self) -> dict[str, Any]:
-        """Facts about the workers that are there, by their addresses."""
+    def _connected(self) -> dict[str, Any]:
+        """Return what is known of the connected workers, by their addresses."""
         found = self._client.scheduler_info(n_workers=-1)
         if "workers" not in found:
             raise WorkersLostError(GONE)
         return dict(found["workers"])
 
     def _await_workers(self) -> None:
-        """Wait for the first worker, and see to it that each has one thread."""
-        if not self._there():
+        """Wait for the first worker, and check that each has one thread."""
+        if not self._connected():
             _log.warning("waiting for the first worker of the cluster")
-        while not self._there():  # jobs wait in a queue for as long as it takes
+        while not self._connected():  # jobs wait in a queue for as long as it takes
             _require_jobs(self._submissions)
             with suppress(TimeoutError):
                 self._client.wait_for_workers(1, timeout=LISTEN)
-        for address, facts in self._there().items():
+        for address, facts in self._connected().items():
             if facts["nthreads"] != 1:
-                rule = "each worker must have one thread: dask worker --nthreads 1 --nworkers N"
-                raise InputError("the cluster", rule, f"{facts['nthreads']} threads of {address}")
+                hint = "Start them with dask worker --nthreads 1 --nworkers N."
+                found = f"{facts['nthreads']} threads of {address}"
+                raise InputError("the cluster", "each worker must have one thread", found, hint)
 
     def _shares(self) -> _Shares | None:
-        """Shares that the workers have of their GPUs; None where one has none."""
+        """Return the shares that the workers have of their GPUs; None if one has no GPU."""
         found = list(self._client.run(describe_worker, on_error="ignore").values())
         if not found or any(facts["memory"] is None for facts in found):
             return None
@@ -177,7 +179,7 @@ class DaskWorkers:
 
 
 def _require_jobs(submissions: Submissions | None) -> None:
-    """Refuse to wait for jobs of which none is left, and which the batch system does not take any more."""
+    """Refuse to wait for jobs when none is left and the batch system takes no more."""
     if submissions is not None and (refusal := submissions.refusal):
         raise WorkersLostError(f"the batch system refuses the jobs: {refusal}.")
 
@@ -186,17 +188,17 @@ class _Shares(NamedTuple):
     """Share of a GPU that each worker has."""
 
     memory: float
-    """Its part of the free memory, where that is least [bytes]."""
+    """Its part of the free memory, the smallest of all [bytes]."""
     workers: int
-    """Workers of a GPU, where these are most."""
+    """Workers of a GPU, the most of all."""
 
 
 @dataclass
 class _Session:
-    """Batches of a wave that are under way."""
+    """Batches of a call that are simulated."""
 
     client: Client
-    wave: Wave
+    results: CallResults
     cases: Sequence[Case]
     engine: Engine | None
     checkpoint: str | None
@@ -205,7 +207,7 @@ class _Session:
     batches: list[list[int]] = field(default_factory=list)
     running: dict[int, Future] = field(default_factory=dict)
     wanted: dict[int, list[int]] = field(default_factory=dict)
-    """Cases that were wanted of a batch when a worker began it."""
+    """Cases of a batch that were wanted when a worker began it."""
 
     def __post_init__(self) -> None:
         from distributed import Queue
@@ -214,19 +216,19 @@ class _Session:
         self._fingerprint = fingerprint_of(self.cases)
 
     def run(self, batches: list[list[int]], most: int) -> None:
-        """Run batches in their order, at most so many in the hands of the scheduler at once."""
+        """Run batches in their order; the scheduler holds `most` of them at once."""
         pile = batches[::-1]
         while pile or self.running:
             while pile and len(self.running) < most:
                 self._submit(pile.pop())
-            if self.wave.is_complete:
+            if self.results.is_complete:
                 self._await_ends()
             else:
                 self._listen()
             pile += self._collect()
 
     def close(self) -> None:
-        """Take back what still runs."""
+        """Cancel what still runs."""
         self.client.cancel(list(self.running.values()), force=True)
         self._queue.close()
 
@@ -240,66 +242,66 @@ class _Session:
         )
 
     def _listen(self) -> None:
-        """Take what the workers say, waiting a while for a first word."""
+        """Take the messages of the workers, after a wait for the first."""
         try:
-            said = self._queue.get(timeout=LISTEN)
+            sent = self._queue.get(timeout=LISTEN)
         except TimeoutError:
             _require_jobs(self.submissions)
-            self.wave.report()
+            self.results.report()
         else:
-            self._hear_each(said)
-        self._hear_all()
+            self._take(sent)
+        self._take_all()
 
     def _await_ends(self) -> None:
-        """Wait a while for batches that have said all; one that runs again asks what is wanted."""
+        """Wait for batches that have sent everything; one that runs again asks what is wanted."""
         from distributed import wait
 
         with suppress(TimeoutError), self.client.as_current():
             wait(list(self.running.values()), timeout=LISTEN)
-        self._hear_all()
+        self._take_all()
 
-    def _hear_all(self) -> None:
-        """Take all that has been said."""
-        for said in self._queue.get(batch=True):
-            self._hear_each(said)
+    def _take_all(self) -> None:
+        """Take all messages that have come."""
+        for sent in self._queue.get(batch=True):
+            self._take(sent)
 
-    def _hear_each(self, said: bytes) -> None:
+    def _take(self, sent: bytes) -> None:
         """Take messages that a worker sent as one."""
-        for message in pickle.loads(said):
-            self._hear(message)
+        for message in pickle.loads(sent):
+            self._take_message(message)
 
-    def _hear(self, message: Message) -> None:
+    def _take_message(self, message: Message) -> None:
         from distributed import Queue
 
         members = self.batches[message.number]
         if message.reply:
-            places = [place for place, index in enumerate(members) if index not in self.wave.results]
+            places = [place for place, index in enumerate(members) if index not in self.results.results]
             if message.number in self.wanted:
                 _log.warning("a worker was lost: %d of its cases go to another one", len(places))
             self.wanted[message.number] = [members[place] for place in places]
             Queue(message.reply, client=self.client).put(places)
         elif message.result is not None:
-            self.wave.take(members[message.index], message.result)
+            self.results.take(members[message.index], message.result)
         elif message.progress is not None:
-            self.wave.follow(message.number, self.wanted[message.number], message.progress)
+            self.results.follow(message.number, self.wanted[message.number], message.progress)
 
     def _collect(self) -> list[list[int]]:
-        """Take leave of batches that have ended; return those that must run once more."""
+        """Remove finished batches; return those that must run once more."""
         again = []
         ended = [(number, future) for number, future in self.running.items() if future.done()]
-        if ended:  # they said their last before they ended
-            self._hear_all()
+        if ended:  # they sent their last message before they ended
+            self._take_all()
         for number, future in ended:
             del self.running[number]
             members = self.batches[number]
-            left = self.wave.left(members)
+            left = self.results.left(members)
             if left:
                 again += self._divided(left, future)
-            self.wave.end(number)
+            self.results.end(number)
         return again
 
     def _divided(self, left: list[int], future: Future) -> list[list[int]]:
-        """Return the halves of a batch that lost its workers again and again; raise any other error."""
+        """Return the halves of a batch that killed its workers; raise any other error."""
         from distributed import KilledWorker
 
         error = future.exception() if future.status == "error" else None
@@ -307,7 +309,7 @@ class _Session:
             half = (len(left) + 1) // 2
             return [left[half:], left[:half]]
         if isinstance(error, KilledWorker):
-            raise WorkersLostError("a case lost its worker again and again, perhaps for lack of memory.")
+            raise WorkersLostError("a case killed its worker repeatedly; it may need more memory.")
         if error is not None:
             raise error
-        raise WorkersLostError("the scheduler lost its tasks: see to it that it runs on.")
+        raise WorkersLostError("the scheduler lost its tasks: check that it is still running.")

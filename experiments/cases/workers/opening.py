@@ -1,4 +1,4 @@
-"""From what a person asks for to workers that are ready."""
+"""Workers that are ready, from what a person asks for."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ ANSWER = 15.0
 """Time in which a scheduler must answer [s]."""
 
 SETTINGS = {
-    # A batch whose worker is lost goes to another one, and batch systems end jobs many times in a campaign.
+    # batch systems end jobs many times in a campaign; a batch whose worker is lost goes to another one
     "distributed.scheduler.allowed-failures": 10,
     "distributed.worker.multiprocessing-method": "spawn",
-    # Looks of Dask at itself, up to a hundred a second, take 5 % of the time of cores that all simulate.
+    # Dask's monitors, up to a hundred calls a second, take 5 % of the time of cores that all simulate
     "distributed.worker.profile.enabled": False,
     "distributed.worker.memory.monitor-interval": "10s",
     "distributed.admin.tick.interval": "1s",
@@ -41,13 +41,10 @@ SETTINGS = {
 
 @contextmanager
 def open_workers(resources: Resources) -> Iterator[Workers]:
-    """Make workers ready, and end what was started for them when the block ends.
+    """Make workers ready; what was started for them ends with the block.
 
-    Raises
-    ------
-    InputError
-        When a device is not there, Dask is needed and is not installed, a scheduler does not answer, or a
-        batch system is not here or refuses all jobs.
+    Raise InputError when a device is missing, Dask is needed and not installed, a scheduler does not answer,
+    or a batch system is missing or refuses all jobs.
     """
     gpus = [] if resources.is_cluster else resources.gpus
     if not resources.is_cluster and len(gpus) * resources.sharing < 2:
@@ -67,20 +64,14 @@ def open_workers(resources: Resources) -> Iterator[Workers]:
 
 
 def require_dask() -> None:
-    """Refuse what needs Dask where it is not installed.
-
-    Raises
-    ------
-    InputError
-        With the command that installs it.
-    """
+    """Raise InputError with the command that installs Dask, if it is missing."""
     if missing := missing_libraries():
-        names = ", ".join(missing)
-        raise InputError("workers", f"several workers need Dask: {EXTRA}", f"not installed: {names}")
+        problem = f"several workers need Dask; not installed: {', '.join(missing)}"
+        raise InputError("workers", problem, hint=f"Install it: {EXTRA}")
 
 
 def missing_libraries() -> list[str]:
-    """Name what clusters need and is not installed."""
+    """Return the libraries that clusters need and that are not installed."""
     needed = ("distributed", "dask_jobqueue", "cryptography")
     return [name for name in needed if find_spec(name) is None]
 
@@ -91,10 +82,10 @@ def _opened(resources: Resources, stack: ExitStack) -> Workers:
     from experiments.cases.workers.dask_clusters import start_processes, submitted_jobs
     from experiments.cases.workers.dask_workers import DaskWorkers
 
-    told = {"device": str(resources)}
+    described = {"device": str(resources)}
     if resources.scheduler is not None:
         client = stack.enter_context(_connected(resources.scheduler))
-        return DaskWorkers(client, told, resources.machine, resources.workers)
+        return DaskWorkers(client, described, resources.machine, resources.workers)
     section = resources.cluster or ClusterSection()
     submissions = None
     if resources.submits_jobs:
@@ -102,7 +93,7 @@ def _opened(resources: Resources, stack: ExitStack) -> Workers:
     else:
         cluster = stack.enter_context(start_processes(resources.gpus, resources.count))
     client = stack.enter_context(Client(cluster, set_as_default=False))
-    return DaskWorkers(client, told, resources.machine, resources.count, submissions)
+    return DaskWorkers(client, described, resources.machine, resources.count, submissions)
 
 
 def _connected(address: str) -> Client:
@@ -111,5 +102,5 @@ def _connected(address: str) -> Client:
     try:
         return Client(address, timeout=ANSWER, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
-        rule = "must be the address of a Dask scheduler that answers, as tcp://HOST:8786"
-        raise InputError("--scheduler", f"expected {rule} ({type(error).__name__})", address) from None
+        problem = f"must be the address of a Dask scheduler that answers ({type(error).__name__})"
+        raise InputError("--scheduler", problem, address, "An example is tcp://HOST:8786.") from None

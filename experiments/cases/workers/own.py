@@ -1,4 +1,4 @@
-"""This machine's own workers: a world a core on a CPU, batches on one GPU."""
+"""Workers of this machine: a world a core on a CPU, batches on one GPU."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines.engine import Engine
 from experiments.cases.forecast.speed import expected_seconds, note_batch
 from experiments.cases.workers.batches import plan_batches
+from experiments.cases.workers.call_results import CallResults
 from experiments.cases.workers.division import run_divided
 from experiments.cases.workers.resources import cpu_name
-from experiments.cases.workers.wave import Wave
 from experiments.cases.workers.workers import Workers
 
 CHEAP_WORLDS = 30
@@ -40,7 +40,7 @@ class OwnWorkers:
     on_advance: OnAdvance | None = None
     """Callback after each advance of a batch of dem-warp's own engine."""
     processes: Processes | None = None
-    """Processes that stay from wave to wave; None: a wave starts its own."""
+    """Processes that stay from call to call; None: each call starts its own."""
     notes_speed: bool = True
     """Note the speed of finished batches: not those of a worker that shares its machine with others."""
 
@@ -51,7 +51,7 @@ class OwnWorkers:
 
     @property
     def on_gpu(self) -> bool:
-        """Tell that the device is a GPU."""
+        """True if the device is a GPU."""
         return self.name != "cpu"
 
     @property
@@ -71,12 +71,12 @@ class OwnWorkers:
 
     @property
     def helpers(self) -> int:
-        """Processes that may measure meanwhile."""
+        """Processes that may measure at the same time."""
         return self.workers or os.cpu_count() or 1
 
     @property
     def leaves_cores(self) -> bool:
-        """Tell that they leave the cores of this machine to those who measure."""
+        """True if the cores of this machine are free for measuring."""
         return self.on_gpu
 
     @property
@@ -96,7 +96,8 @@ class OwnWorkers:
 
         On a CPU all are one batch, whose processes take the costly cases first.
         """
-        wave = Wave(cases, on_result, on_progress, None if engine else expected_seconds(cases, self))
+        expected = None if engine else expected_seconds(cases, self)
+        results = CallResults(cases, on_result, on_progress, expected)
 
         def run(batch: int, members: list[int]) -> None:
             every = checkpoint_interval(len(members) if self.on_gpu else 1)
@@ -106,35 +107,35 @@ class OwnWorkers:
             simulator(
                 [cases[index] for index in members],
                 device=self.name,
-                on_result=lambda number, result: wave.take(members[number], result),
-                on_progress=partial(wave.follow, batch, members),
+                on_result=lambda number, result: results.take(members[number], result),
+                on_progress=partial(results.follow, batch, members),
                 checkpoint=checkpoint,
             )
 
-        for number, batch in enumerate(self._batches(cases, wave, engine)):
-            run_divided(wave, batch, partial(run, number))
-            wave.end(number)
+        for number, batch in enumerate(self._batches(cases, results, engine)):
+            run_divided(results, batch, partial(run, number))
+            results.end(number)
         if engine is None and self.notes_speed:
-            note_batch(cases, self, *wave.pace)
-        return wave.in_order()
+            note_batch(cases, self, *results.pace)
+        return results.in_order()
 
-    def _batches(self, cases: Sequence[Case], wave: Wave, engine: Engine | None) -> list[list[int]]:
+    def _batches(self, cases: Sequence[Case], results: CallResults, engine: Engine | None) -> list[list[int]]:
         if not cases:
             return []
         if self.on_gpu and engine is None:
-            return plan_batches(cases, wave.costs, memory=wp.get_device(self.name).free_memory)
-        return [[index for batch in plan_batches(cases, wave.costs) for index in batch]]
+            return plan_batches(cases, results.costs, memory=wp.get_device(self.name).free_memory)
+        return [[index for batch in plan_batches(cases, results.costs) for index in batch]]
 
 
 def checkpoint_interval(worlds: int) -> float:
-    """Wall time between two checkpoints of a launch, which stands still while each world's is written [s]."""
+    """Return the wall time between two checkpoints of a launch, which pauses while they are written [s]."""
     return CHECKPOINT_EVERY * max(1.0, worlds / CHEAP_WORLDS)
 
 
 def watched_by(workers: Workers, on_advance: OnAdvance) -> Workers:
-    """Return workers whose batches are looked at, where they are this machine's own."""
+    """Return workers whose batches call a function as they advance, if they are this machine's own."""
     return replace(workers, on_advance=on_advance) if isinstance(workers, OwnWorkers) else workers
 
 
 THIS_MACHINE = OwnWorkers()
-"""Workers where none are named."""
+"""Workers when none are named."""

@@ -1,4 +1,4 @@
-"""Resources as asked for, against what there is: devices, number of workers, name of the machine."""
+"""Resources that a person asks for, checked against the machine: devices, number of workers, its name."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ PROCESS_BYTES = 450e6
 """Memory of a process that simulates or measures [bytes]."""
 
 MOST_PER_CORE = 8
-"""Processes a core of this machine: more gain nothing, and a measurement of speed has a case for each."""
+"""Processes a core of this machine; more gain nothing."""
 
 
 @dataclass(frozen=True)
 class Resources:
-    """Workers as a person asks for them; nothing named: this machine's own."""
+    """Workers that a person asks for; default: this machine's own."""
 
     device: str | None = None
     """``"cpu"``, ``"cuda"``, ``"cuda:1"``, or several GPUs between commas; None: the GPU if there is one."""
@@ -40,52 +40,47 @@ class Resources:
     cluster: ClusterSection | None = None
     """Workers that are started for the run."""
     gpu_workers: int | None = None
-    """Processes a GPU of this machine; None: `GPU_WORKERS`, but of one GPU without a cluster this process."""
+    """Processes a GPU of this machine; None: `GPU_WORKERS`, or this process for one GPU without a cluster."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be an address, of which Dask finds out late and with a traceback."""
+        """Refuse what cannot be an address; Dask finds it late, with a traceback."""
         if self.scheduler is not None and not _is_address(self.scheduler):
-            rule = "must be the address of a Dask scheduler, as tcp://HOST:8786"
-            raise InputError("--scheduler", rule, self.scheduler)
+            hint = "An example is tcp://HOST:8786."
+            raise InputError("--scheduler", "must be the address of a Dask scheduler", self.scheduler, hint)
 
     @property
     def is_cluster(self) -> bool:
-        """Tell that the workers are those of a cluster."""
+        """True if the workers are those of a cluster."""
         return self.scheduler is not None or self.cluster is not None
 
     @property
     def submits_jobs(self) -> bool:
-        """Tell that the workers are jobs of a batch system."""
+        """True if the workers are jobs of a batch system."""
         return self.scheduler is None and self.cluster is not None and self.cluster.kind != "local"
 
     @property
     def gpus(self) -> list[str]:
-        """Names of the GPUs of this machine that are used; empty: the CPU is.
+        """Names of the GPUs of this machine that are used; empty: the CPU.
 
-        Raises
-        ------
-        InputError
-            When a device is not there, or more GPUs are asked for than there are.
+        Raise InputError when a device is missing, or more GPUs are asked for than there are.
         """
         if self.cluster is not None and self.cluster.gpu is False:
             return []
         devices = resolve_devices(self.device)
         if devices == ["cpu"]:
             if self.cluster is not None and self.cluster.gpu:
-                raise InputError("cluster.gpu", "a worker with a GPU needs one", "none here")
+                raise InputError("cluster.gpu", "this machine has no GPU")
             return []
         there = devices if self.device else [gpu.alias for gpu in wp.get_cuda_devices()]
         wanted = self.workers or (self.cluster.workers or len(there) if self.cluster else len(devices))
         if wanted > len(there):
-            rule = (
-                f"expected counts GPUs, of {len(there)} here; processes on the CPU are had with --device cpu"
-            )
-            raise InputError("--workers", rule, wanted)
+            hint = "With --device cpu it counts processes."
+            raise InputError("--workers", f"must be at most the {len(there)} GPUs", wanted, hint)
         return there[:wanted]
 
     @property
     def sharing(self) -> int:
-        """Workers of a GPU, as far as is known before they are there; of a job, each has its own."""
+        """Workers of a GPU, as far as is known before they start; workers of a job have one each."""
         if self.scheduler is not None or self.submits_jobs or not self.gpus:
             return 1
         alone = self.cluster is None and len(self.gpus) == 1
@@ -93,13 +88,10 @@ class Resources:
 
     @property
     def count(self) -> int:
-        """Workers, as far as is known before they are there.
+        """Number of workers, as far as is known before they start.
 
-        Raises
-        ------
-        InputError
-            When a device is not there, more processes are asked for than this machine's cores can serve, or
-            a job would not be filled.
+        Raise InputError when a device is missing, more processes are asked for than this machine's cores can
+        serve, or a job would not be filled.
         """
         asked = self.workers or (self.cluster.workers if self.cluster else None)
         if self.scheduler is not None:
@@ -110,8 +102,8 @@ class Resources:
             return len(self.gpus) * self.sharing
         cores = os.cpu_count() or 1
         if asked and asked > MOST_PER_CORE * cores:
-            rule = f"expected counts processes of this machine, at most {MOST_PER_CORE} a core: {MOST_PER_CORE * cores}"
-            raise InputError(self._place_of_workers, rule, asked)
+            problem = f"must be at most {MOST_PER_CORE} processes a core, {MOST_PER_CORE * cores} here"
+            raise InputError(self._place_of_workers, problem, asked)
         return asked or cores
 
     def memory(self, cases: Sequence[Case], most: int) -> float:
@@ -126,7 +118,7 @@ class Resources:
         return each * self.sharing * -(-most // (self.count * rounds))
 
     def _in_whole_jobs(self, asked: int, each: int) -> int:
-        # Dask would end what is over, with all of its job, and submit that job again, without end
+        # Dask would end the surplus with all of its job, and submit that job again, for ever
         if asked % each:
             raise InputError(self._place_of_workers, f"must fill whole jobs of {each} workers", asked)
         return asked
@@ -137,7 +129,7 @@ class Resources:
 
     @property
     def on_gpu(self) -> bool:
-        """Tell that the workers have GPUs, as far as is known before they are there."""
+        """True if the workers have GPUs, as far as is known before they start."""
         if self.submits_jobs:
             return bool(self.cluster and self.cluster.gpu)
         return self.scheduler is None and bool(self.gpus)
@@ -153,7 +145,7 @@ class Resources:
         return str(wp.get_device(self.gpus[0]).name) if self.gpus else cpu_name(self.count)
 
     def __str__(self) -> str:
-        """Say in words where cases are simulated."""
+        """Name the place where cases are simulated."""
         number = f"{self.count} {'worker' if self.count == 1 else 'workers'}"
         if self.scheduler is not None:
             return f"the workers of {self.scheduler}"
@@ -174,12 +166,9 @@ def _is_address(text: str) -> bool:
 
 
 def resolve_devices(names: str | None) -> list[str]:
-    """Names of the devices to run on: as asked, several GPUs as ``"cuda:0,cuda:1"``, or the engine's choice.
+    """Return the devices to run on: those asked for, e.g. ``"cuda:0,cuda:1"``, or the engine's choice.
 
-    Raises
-    ------
-    InputError
-        If one is not there or is named twice, or the CPU stands beside a GPU.
+    Raise InputError when one is missing or named twice, or the CPU is combined with a GPU.
     """
     asked = [None] if names is None else [name.strip() for name in names.split(",")]
     try:

@@ -1,4 +1,4 @@
-"""Submissions of jobs that are workers: whether their command is there, and what the batch system says."""
+"""Submissions of jobs that are workers: the command, and the answers of the batch system."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ SYSTEMS = {
 """Classes of dask-jobqueue by the kinds of `ClusterSection`."""
 
 _SAID = re.compile(r"\nstdout:\n(.*)\nstderr:\n(.*)", re.DOTALL)
-"""Words of a command, in the error that dask-jobqueue makes of its exit code."""
+"""Output of a command, in dask-jobqueue's error about its exit code."""
 
 
 def cluster_class(kind: str) -> Any:
-    """Class of dask-jobqueue for a kind of `ClusterSection`."""
+    """Return the class of dask-jobqueue for a kind of `ClusterSection`."""
     with _ctrl_c_kept():
         import dask_jobqueue
 
@@ -38,7 +38,7 @@ def cluster_class(kind: str) -> Any:
 
 @contextmanager
 def _ctrl_c_kept() -> Iterator[None]:
-    """Keep what Ctrl-C does: as dask-jobqueue is loaded, it lets it end Python with the exit code 0."""
+    """Keep the handler of Ctrl-C: loading dask-jobqueue installs one that exits with code 0."""
     before = signal.getsignal(signal.SIGINT)
     try:
         yield
@@ -47,26 +47,20 @@ def _ctrl_c_kept() -> Iterator[None]:
 
 
 def submit_command(kind: str) -> str:
-    """Name of the program that submits jobs of a kind."""
+    """Return the name of the program that submits jobs of a kind."""
     return shlex.split(cluster_class(kind).job_cls.submit_command)[0]
 
 
 def require_submit_command(section: ClusterSection) -> None:
-    """Refuse a batch system whose command to submit jobs is not here.
-
-    Raises
-    ------
-    InputError
-        With the name of the command.
-    """
+    """Raise InputError if the command that submits jobs is missing."""
     command = submit_command(section.kind)
     if shutil.which(command) is None:
-        rule = f"needs the command {command}, which is not on the PATH: run this where jobs are submitted"
-        raise InputError("cluster.kind", rule, section.kind)
+        problem = f"needs the command {command}, which is not on the PATH"
+        raise InputError("cluster.kind", problem, section.kind, "Run this where jobs are submitted.")
 
 
-def words_of(error: Exception) -> str:
-    """Words of a batch system about a job that it refused, on one line."""
+def message_of(error: Exception) -> str:
+    """Return the message of a batch system about a job that it refused, on one line."""
     said = _SAID.search(str(error))
     printed, complained = said.groups() if said else ("", "")
     words = complained.strip() or printed.strip() or str(error) or type(error).__name__
@@ -74,7 +68,7 @@ def words_of(error: Exception) -> str:
 
 
 class Submissions:
-    """Fate of the jobs that were submitted: threads of Dask note it, and the run looks.
+    """Fate of the jobs that were submitted: threads of Dask note it, and the run reads it.
 
     Parameters
     ----------
@@ -91,7 +85,7 @@ class Submissions:
 
     @property
     def refusal(self) -> str | None:
-        """Words of the batch system where it refused all jobs and none that it took is left, else None.
+        """Message of the batch system if it refused all jobs and no accepted one is left, else None.
 
         A job that waits in the queue counts as taken.
         """
@@ -108,8 +102,8 @@ class Submissions:
         self.decided.set()
 
     def refuse(self, name: str, error: Exception) -> str:
-        """Note that a job was refused, and return what was said."""
-        words = words_of(error)  # the error itself would keep its job alive, which Dask then misses
+        """Note that a job was refused, and return the message."""
+        words = message_of(error)  # the error itself would keep its job alive, which Dask then misses
         with self._lock:
             self._refused[name] = words
         if self.refusal is not None:
@@ -117,22 +111,15 @@ class Submissions:
         return words
 
     def end(self, name: str) -> None:
-        """Note that a job is gone."""
+        """Note that a job has ended."""
         with self._lock:
             self._taken.discard(name)
 
 
 def noted_jobs(job_class: Any, submissions: Submissions, warn: Any) -> Any:
-    """Class of jobs whose submissions are noted instead of raised: Dask would print a traceback and go on.
+    """Return a class of jobs whose refusals are noted; Dask would print a traceback and continue.
 
-    Parameters
-    ----------
-    job_class
-        Class of dask-jobqueue.
-    submissions
-        Taker of the notes.
-    warn
-        Called with what is said of a job that is refused while others are there.
+    `warn` is called with the message about a job that is refused while others are accepted.
     """
     from distributed import Status
 
@@ -144,7 +131,7 @@ def noted_jobs(job_class: Any, submissions: Submissions, warn: Any) -> Any:
                 words = submissions.refuse(str(self.name), error)
                 if submissions.refusal is None:
                     warn(words)
-                self.status = Status.running  # Dask asks for this of a start; without an id, nothing is there
+                self.status = Status.running  # Dask expects this of a start
             else:
                 submissions.take(str(self.name))
 

@@ -13,11 +13,11 @@ from experiments.cases.engines.engine import Engine
 
 
 class WorkersLostError(BrokenExecutor):
-    """Workers were lost and their cases with them, in words; what had finished was handed on."""
+    """Workers were lost and their cases with them; what had finished was handed on."""
 
 
 class Workers(Protocol):
-    """Whatever simulates cases, for one wave after another."""
+    """Simulates cases, one call after another."""
 
     @property
     def count(self) -> int:
@@ -25,7 +25,7 @@ class Workers(Protocol):
 
     @property
     def on_gpu(self) -> bool:
-        """Tell that they have GPUs, each one or a share of it."""
+        """True if they have GPUs, each one or a share of it."""
 
     @property
     def sharing(self) -> int:
@@ -37,11 +37,11 @@ class Workers(Protocol):
 
     @property
     def helpers(self) -> int:
-        """Processes of this machine that may measure meanwhile."""
+        """Processes of this machine that may measure at the same time."""
 
     @property
     def leaves_cores(self) -> bool:
-        """Tell that they leave the cores of this machine to those who measure."""
+        """True if the cores of this machine are free for measuring."""
 
     @property
     def described(self) -> dict[str, Any]:
@@ -60,8 +60,5 @@ class Workers(Protocol):
         Each is handed to ``on_result`` with its index as it ends. A case that raises, or that the device has
         no memory for, ends with the status `NO_ANSWER` and its reason; the others go on.
 
-        Raises
-        ------
-        WorkersLostError
-            When workers are lost again and again.
+        Raise WorkersLostError when workers are lost repeatedly.
         """

@@ -108,7 +108,7 @@ async function refreshHeaps() {
     if (tile.heap.at_rest && tile.drawn) continue;
     if (tile.drawn && state.progress.state !== "running") continue;
     const answer = await fetch(`heap/${tile.heap.id}`, { cache: "no-store" });
-    if (!answer.ok) continue; // a case that has ended has no glimpse any more
+    if (!answer.ok) continue; // a case that has ended has no preview any more
     tile.phase = answer.headers.get("X-Phase");
     tile.fraction = Number(answer.headers.get("X-Fraction"));
     tile.view.set(new Float32Array(await answer.arrayBuffer()));

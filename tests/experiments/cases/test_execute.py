@@ -24,7 +24,7 @@ ANGLE_TOLERANCE = 1.0
 
 
 class Engine:
-    """Stands in for the simulator: a case with friction mu ends in a cone of slope mu, or as it is told."""
+    """Stands in for the simulator: a case with friction mu ends in a cone of slope mu, or as scripted."""
 
     def __init__(self, cone: Cone) -> None:
         self.cone = cone

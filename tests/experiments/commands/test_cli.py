@@ -14,9 +14,8 @@ import pytest
 import pyvista
 from commandline import dem_warp
 
-from experiments import api
 from experiments.commands.console import CaseProgress, describe_progress, duration
-from experiments.runs import campaign as run
+from experiments.runs import calibration as run
 from experiments.studyfile import load_study
 from experiments.studyfile.manifest import study_hash
 from imaging import save_picture
@@ -78,7 +77,7 @@ def test_a_file_that_is_no_study_is_answered_before_any_library_is_imported(
 
 
 def test_a_calibration_does_not_need_pyvista() -> None:
-    program = "import sys; import experiments.runs.campaign; print('pyvista' in sys.modules)"
+    program = "import sys; import experiments.runs.calibration; print('pyvista' in sys.modules)"
     assert last_line_of(program) == "False"
 
 
@@ -163,13 +162,6 @@ def test_another_test_than_a_heap_gives_what_it_measures(write_study: WriteStudy
     assert Path("results/snapshot.png").is_file()
 
 
-@pytest.mark.parametrize("option", ["--follow-paper", "--only-paper"])
-def test_only_the_papers_study_follows_the_paper(write_study: WriteStudy, option: str) -> None:
-    code, _, err = dem_warp("calibrate", write_study(), option, "--device", "cpu", "--out", "results")
-    assert (code, Path("results").exists()) == (2, False)
-    assert "only a study whose companion has published runs" in " ".join(err.split())
-
-
 def test_an_angle_that_no_heap_has_cannot_be_calibrated(write_study: WriteStudy) -> None:
     path = of_a_hopper(write_study)
     path.write_text(path.read_text("utf-8") + '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', "utf-8")
@@ -184,7 +176,7 @@ def test_a_used_folder_is_refused(write_study: WriteStudy) -> None:
     for command in ("calibrate", "heap"):
         code, _, err = dem_warp(command, write_study(), "--device", "cpu", "--out", "results")
         assert code == 2
-        assert "new or empty" in err
+        assert "the folder is not empty" in err
     assert [path.name for path in Path("results").iterdir()] == ["mine.txt"]
 
 
@@ -192,7 +184,7 @@ def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(api, "run_campaign", interrupt)
+    monkeypatch.setattr(run, "run_campaign", interrupt)
     path = write_study()
     command = (
         "calibrate",

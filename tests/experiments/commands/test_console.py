@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from experiments import api, cases
 from experiments.cli import app
 from experiments.commands.console import Attempt, plain
 from experiments.io.toml_files import read_toml, toml_text
+from experiments.runs import calibration, one_heap, run_folder
 
 WriteStudy = Callable[..., Path]
 
@@ -30,7 +30,7 @@ def calibrate(
 
     def run(campaign: Callable[..., object], out: str = "out") -> tuple[int, str]:
         monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(api, "run_campaign", campaign)
+        monkeypatch.setattr(calibration, "run_campaign", campaign)
         words = ["calibrate", str(write_study()), "--device", "cpu", "--out", out]
         result = CliRunner().invoke(app, words)
         assert result.exception is None or isinstance(result.exception, SystemExit)
@@ -50,7 +50,7 @@ def raising(error: BaseException) -> Callable[..., object]:
     ("error", "said"),
     [
         (OSError(errno.ENOSPC, "No space left on device", "out/report.html"), "free some room on the disk"),
-        (PermissionError(errno.EACCES, "Permission denied", "out/report.html"), "see to the permissions"),
+        (PermissionError(errno.EACCES, "Permission denied", "out/report.html"), "check the permissions"),
         (
             FileNotFoundError(errno.ENOENT, "No such file or directory", "out/x"),
             "nothing is moved or removed",
@@ -81,7 +81,7 @@ def test_sigterm_ends_as_ctrl_c_does(calibrate: Callable[..., tuple[int, str]]) 
 def test_before_there_is_a_folder_a_command_begins_again(
     calibrate: Callable[..., tuple[int, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(api, "locked", raising(KeyboardInterrupt()))
+    monkeypatch.setattr(run_folder, "locked", raising(KeyboardInterrupt()))
     code, err = calibrate(raising(AssertionError()))
     assert code == 130
     assert "Begin again with: dem-warp calibrate" in err
@@ -92,7 +92,7 @@ def test_before_there_is_a_folder_a_command_begins_again(
     ("ending", "ended", "said"),
     [(signal.SIGTERM, 143, "Ended by SIGTERM."), (signal.SIGINT, 130, "Interrupted.")],
 )
-def test_a_heap_that_is_ended_tells_how_to_begin_again(
+def test_a_heap_that_is_ended_says_how_to_continue(
     write_study: WriteStudy,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -101,16 +101,16 @@ def test_a_heap_that_is_ended_tells_how_to_begin_again(
     said: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cases, "simulate_heap", lambda *_: os.kill(os.getpid(), ending))
+    monkeypatch.setattr(one_heap, "simulate_heap", lambda *_: os.kill(os.getpid(), ending))
     study = write_study().rename(tmp_path / "my wheat.toml")
     words = [study.name, "--out", "my heap", "--set", "E=0.5", "--seed", "3", "--device", "cpu", "--json"]
-    for _ in range(2):  # what is told is no folder that the next one refuses
-        result = CliRunner().invoke(app, ["heap", *words])
-        again = "dem-warp heap 'my wheat.toml' --out 'my heap' --set E=0.5 --seed 3 --device cpu --json"
-        assert (result.exit_code, f"{said} Begin again with: {again}\n" in result.stderr) == (ended, True)
+    again = "dem-warp heap 'my wheat.toml' --out 'my heap' --device cpu --set E=0.5 --seed 3 --json --resume"
+    for more in ([], ["--resume"]):
+        result = CliRunner().invoke(app, ["heap", *words, *more])
+        assert (result.exit_code, f"{said} Resume with: {again}\n" in result.stderr) == (ended, True)
 
 
-def test_an_option_with_several_values_is_told_once_for_each() -> None:
+def test_an_option_with_several_values_is_repeated() -> None:
     attempt = Attempt.of("heap", None, out=Path("out"), set=["E=0.5", "F=40 deg"], scene=None)
     assert attempt.command == "dem-warp heap --out out --set E=0.5 --set 'F=40 deg'"
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.commands.early import check_calibration_file, check_heap_file
 from experiments.io.errors import StudyError
-from experiments.studyfile import write_template
+from experiments.runs.choices import check_campaign, check_scene
+from experiments.studyfile import load_study, write_template
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -128,9 +128,9 @@ low = "40 mm"
 high = "20000 m"
 """
     path.write_text(text + factor, encoding="utf-8")
-    check_heap_file(path)
+    check_scene(load_study(path))
     with pytest.raises(StudyError, match="at most"):
-        check_calibration_file(path)
+        check_campaign(load_study(path))
 
 
 def test_an_engine_that_is_none_is_answered_as_early(tmp_path: Path) -> None:

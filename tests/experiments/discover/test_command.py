@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from experiments.cases import OwnWorkers
 from experiments.cli import app
-from experiments.runs.campaign import check_runs
-from experiments.runs.search import OUTCOMES, Job, run_search
+from experiments.runs.choices import measured_study, prepare
+from experiments.runs.request import RunRequest
+from experiments.runs.run_folder import OUTCOMES
+from experiments.runs.search import SearchData, run_search
 from experiments.studyfile import Study, load_study, loading
 from experiments.studyfile.observables import PHOTOGRAPHED
 from experiments.studyfile.places import Places
@@ -129,8 +130,8 @@ def test_a_tilted_plate_is_found_on_the_real_engine(tmp_path: Path) -> None:
     # the radii of the fast and the wide heaps by several of its errors.
     few = {"refinement_points": 4, "refinement_rounds": 1, "shortlist": 1, "direct_runs": 4}
     trial = load_study(STUDY, "bench", {"discover": {"settings": few}})
-    # In one process: new ones for each wave take a tenth of the time.
-    ended = run_search(Job(trial, TRIAL / "tilted-bench.csv", tmp_path / "out", workers=OwnWorkers("cpu", 1)))
+    request = RunRequest(out=tmp_path / "out", device="cpu", workers=1)
+    ended = run_search(prepare(trial, request), SearchData(TRIAL / "tilted-bench.csv"))
     found = ended.discovery
     assert found is not None
     assert found.named == ("plate_tilt",)
@@ -145,5 +146,5 @@ def test_a_tilted_plate_is_found_on_the_real_engine(tmp_path: Path) -> None:
     assert training.after.value < training.before.value
     assert held_out.after.value < held_out.before.value
     again = load_study(tmp_path / "out" / "study-with-plate_tilt.toml")
-    check_runs(again)
+    measured_study(again)
     assert again.factors[-1].name == "plate_tilt"

@@ -10,10 +10,9 @@ import pytest
 
 from dem_warp import Case, CaseResult, Progress, simulate
 from doe.discrepancy import Point
-from experiments.cases import OwnWorkers
+from experiments.cases import OwnWorkers, execute
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.workers import own
-from experiments.discover import wave
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
 from experiments.io.errors import StoreError
@@ -66,16 +65,16 @@ def table(tmp_path: Path) -> OutcomeTable:
     return OutcomeTable(tmp_path / "cases" / "outcomes.sqlite")
 
 
-def build(study: Study, table: OutcomeTable, progress: Callable[[Progress], None] | None = None):
-    return EngineSimulator(study, library_for(study), table, OwnWorkers("cpu", 1), progress)
+def build(study: Study, table: OutcomeTable) -> EngineSimulator:
+    return EngineSimulator(study, library_for(study), table, OwnWorkers("cpu", 1))
 
 
 def test_points_are_answered_by_heaps_measured_and_kept(
     study: Study, table: OutcomeTable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[Progress] = []
-    with build(study, table, seen.append) as simulator:
-        outcomes = simulator([*POINTS, POINTS[0]])
+    with build(study, table) as simulator:
+        outcomes = simulator([*POINTS, POINTS[0]], seen.append)
         assert (seen[-1].done, seen[-1].total, seen[-1].fraction) == (3, 3, 1.0)
 
         [direct] = simulate([study.under("wide").case({"E": 0.5}, 2)], device="cpu", workers=1)
@@ -92,19 +91,18 @@ def test_points_are_answered_by_heaps_measured_and_kept(
 def test_a_run_that_was_killed_keeps_what_it_had_measured(
     study: Study, table: OutcomeTable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(wave, "SAVE_EVERY", 0.0)
+    monkeypatch.setattr(execute, "SAVE_EVERY", 0.0)
 
     def kill(progress: Progress) -> None:
         if progress.done == 2:
             raise KilledError
 
-    simulator = build(study, table, kill)
     with pytest.raises(KilledError):
-        simulator(POINTS)
+        build(study, table)(POINTS, kill)
     kept = len(table)
     seen: list[Progress] = []
-    with build(study, table, seen.append) as simulator:
-        assert simulator(POINTS).finished.all()
+    with build(study, table) as simulator:
+        assert simulator(POINTS, seen.append).finished.all()
     assert kept >= 1
     assert seen[-1].total == len(POINTS) - kept
 

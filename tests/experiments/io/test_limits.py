@@ -24,7 +24,7 @@ from experiments.io.rows import read_rows
 from experiments.io.toml_files import read_toml
 from experiments.io.units import Quantity
 from experiments.measurement.measured_target import with_measurements
-from experiments.runs.campaign import check_runs
+from experiments.runs.choices import measured_study
 from experiments.studyfile import load_study
 from experiments.studyfile.manifest import read_manifest
 from imaging import PictureError, measure_photograph
@@ -121,7 +121,7 @@ def test_a_case_that_no_memory_holds_is_refused_before_it_is_made(
     with pytest.raises(StudyError, match=said):
         study.case({}, 1)
     with pytest.raises(StudyError, match=said):
-        check_runs(study)
+        measured_study(study)
 
 
 @pytest.mark.parametrize("count", [130_000_000, 1_000_000_000])

@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 import pytest
 from commandline import dem_warp
 
-from experiments.cases.engines import keeper
+from experiments.cases.engines import run_program
 from experiments.commands.console import Attempt
 from experiments.io.files import is_device_name
 from experiments.measurement.photographs import drawn_names
@@ -29,7 +29,7 @@ ONLY_POSIX = {
 }  # fmt: skip
 ONLY_POSIX_MODULES = {"fcntl", "grp", "pwd", "resource", "termios", "tty", "pty", "syslog"}
 GUARDED = {
-    "experiments/cases/engines/keeper.py": {"os.killpg", "signal.SIGKILL"},
+    "experiments/cases/engines/run_program.py": {"os.killpg", "signal.SIGKILL"},
     "experiments/runs/examination.py": {"os.sched_getaffinity"},
 }
 """Calls that stand behind a question for the system."""
@@ -111,11 +111,11 @@ def test_copies_have_names_of_their_own_on_every_system() -> None:
 def test_a_program_is_ended_at_its_limit_without_process_groups(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(keeper, "POSIX", False)
-    monkeypatch.setattr(keeper, "_end_with_starter", lambda program: None)
+    monkeypatch.setattr(run_program, "POSIX", False)
+    monkeypatch.setattr(run_program, "_end_with_starter", lambda program: None)
     monkeypatch.chdir(tmp_path)
-    keeper.main("0.5", sys.executable, "-c", "import threading; threading.Event().wait()")
-    ending = json.loads(Path(keeper.ENDING).read_text(encoding="utf-8"))
+    run_program.main("0.5", sys.executable, "-c", "import threading; threading.Event().wait()")
+    ending = json.loads(Path(run_program.ENDING).read_text(encoding="utf-8"))
     assert (ending["timed_out"], ending["code"]) == (True, None)
     assert ending["seconds"] >= 0.5
 

@@ -25,13 +25,13 @@ Cone = Callable[..., CaseResult]
 
 
 def begin(folder: Path, study: Study, cone: Cone) -> Journal:
-    """Begin a run: two cases planned, one of them ended and stored, a glimpse of the other."""
+    """Begin a run: two cases planned, one of them ended and stored, a preview of the other."""
     journal = Journal(folder, "calibrate", study, device="cpu").__enter__()
     table = plan_cases(study, "screening", _points(study), 1, study.target.responses)
     journal.planned(table.assign(case_key=[KEY, OTHER]), ["d" * 64, NAME])
     Store(folder / "cases").save(KEY, cone())
     journal.ended(KEY, {"status": "finished", "reason": "", "angle": 26.5, "angle_se": 0.5})
-    journal.glimpses.write(NAME, cone(0.3), {"phase": "lift", "fraction": 0.4})
+    journal.previews.write(NAME, cone(0.3), {"phase": "lift", "fraction": 0.4})
     write_text(folder / "report.html", "<!doctype html><title>The report</title><script>1</script>")
     write_text(folder / "tables" / "cases.csv", "run\n1\n")
     return journal

@@ -82,7 +82,7 @@ def test_the_state_tells_what_the_run_does(client: TestClient) -> None:
     state = client.get(f"/{TOKEN}/state.json").json()
     assert state["run"] == {"command": "calibrate", "study": "Small", "scale": None, "device": "cpu"}
     assert state["progress"]["state"] == "running"
-    assert [heap["id"] for heap in state["heaps"]] == [f"glimpse/{NAME}", f"case/{KEY}"]
+    assert [heap["id"] for heap in state["heaps"]] == [f"preview/{NAME}", f"case/{KEY}"]
     assert state["heaps"][0]["title"] == "screening, run 2, replicate 1"
     assert (state["cases"]["ended"], state["cases"]["planned"]) == (1, 2)
     assert [line["text"] for line in state["log"]] == ["The run begins."]
@@ -96,15 +96,15 @@ def test_what_has_not_changed_is_not_sent_again(client: TestClient) -> None:
 
 
 def test_heaps_come_as_their_spheres(client: TestClient, cone: Callable[..., CaseResult]) -> None:
-    for name, heap in ((f"case/{KEY}", cone()), (f"glimpse/{NAME}", cone(0.3))):
+    for name, heap in ((f"case/{KEY}", cone()), (f"preview/{NAME}", cone(0.3))):
         rows = np.frombuffer(client.get(f"/{TOKEN}/heap/{name}").content, "<f4").reshape(-1, 5)
         np.testing.assert_allclose(rows[:, :3], heap.sphere_centers, atol=1e-9)
         np.testing.assert_allclose(rows[:, 3], heap.sphere_radii, rtol=1e-6)
-    assert client.get(f"/{TOKEN}/heap/glimpse/{NAME}").headers["x-phase"] == "lift"
+    assert client.get(f"/{TOKEN}/heap/preview/{NAME}").headers["x-phase"] == "lift"
 
 
 @pytest.mark.parametrize(
-    "name", [f"case/{OTHER}", "case/../study", "glimpse/x", "other/" + KEY, "%2e%2e/secret", f"case/{KEY}%00"]
+    "name", [f"case/{OTHER}", "case/../study", "preview/x", "other/" + KEY, "%2e%2e/secret", f"case/{KEY}%00"]
 )
 def test_a_heap_that_is_not_there_is_no_error(client: TestClient, name: str) -> None:
     assert client.get(f"/{TOKEN}/heap/{name}").status_code == 204
@@ -141,7 +141,7 @@ def test_watching_changes_nothing(client: TestClient, run_folder: Path) -> None:
         path: path.read_bytes() for path in run_folder.rglob("*") if path.is_file() and path.name != "beat"
     }
     before = found()
-    for name in ("", "state.json", f"heap/case/{KEY}", f"heap/glimpse/{NAME}", "file/report.html"):
+    for name in ("", "state.json", f"heap/case/{KEY}", f"heap/preview/{NAME}", "file/report.html"):
         client.get(f"/{TOKEN}/{name}")
     assert found() == before
 

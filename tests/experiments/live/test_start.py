@@ -302,7 +302,7 @@ def test_a_run_that_is_unknown_is_not_watched(client: TestClient, folder: Path) 
 def test_folders_that_go_while_they_are_read_are_no_error(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run's end takes its glimpses away, whoever looks at them."""
+    """A run's end takes its previews away, whoever looks at them."""
     (folder / "out" / "heap" / ".live").mkdir(parents=True)
     runs = started.Runs(folder)
     assert [run["folder"] for run in runs.listed()] == ["out/heap"]

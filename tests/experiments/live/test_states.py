@@ -15,7 +15,8 @@ from conftest import KEY, NAME, begin
 
 from dem_warp import CaseResult, Progress
 from experiments.cases import Store, open_folder
-from experiments.cases.store.folder import JOURNAL, is_used
+from experiments.cases.store.folder import is_used
+from experiments.io.files import JOURNAL
 from experiments.journal.journal import BEAT, CASES, PROGRESS, Journal
 from experiments.live.charts import charts_of
 from experiments.live.state import RunState
@@ -67,7 +68,7 @@ def test_a_killed_run_is_interrupted(run_folder: Path, small_study: Study, cone:
     assert state.progress.state == "interrupted"
     assert state.progress.message.startswith("No sign of life for 2 min")
     # what it had under way is still shown
-    assert [heap["id"] for heap in state.heaps] == [f"glimpse/{NAME}", f"case/{KEY}"]
+    assert [heap["id"] for heap in state.heaps] == [f"preview/{NAME}", f"case/{KEY}"]
 
 
 def test_a_run_gives_signs_of_life(
@@ -163,7 +164,7 @@ def test_a_journal_that_cannot_be_written_ends_no_run(tmp_path: Path, small_stud
     with Journal(tmp_path, "heap", small_study, resume=True) as journal:
         journal.say("nobody hears")
         journal.ended(KEY, {"status": "finished"})
-        journal.glimpses.write(NAME, cone(), {"phase": "lift", "fraction": 0.5})
+        journal.previews.write(NAME, cone(), {"phase": "lift", "fraction": 0.5})
         with journal.batch("heap"):
             pass
     assert RunState.read(tmp_path).log == []
@@ -175,7 +176,7 @@ def test_damaged_notes_are_passed_over(run_folder: Path, small_study: Study, con
         path = run_folder / JOURNAL / name
         whole = path.read_bytes() if path.exists() else b""
         path.write_bytes(whole + b'{"half": \n[1]\nnull\n\xff\n')
-    (run_folder / JOURNAL / "glimpses" / f"{NAME}.npz").write_bytes(b"PK")
+    (run_folder / JOURNAL / "previews" / f"{NAME}.npz").write_bytes(b"PK")
     state = RunState.read(run_folder)
     assert len(state.cases) == 2
     assert json.loads(state_text(run_folder))["cases"]["ended"] == 1
@@ -218,7 +219,7 @@ def test_charts_follow_the_cases(run_folder: Path, small_study: Study, cone: Con
     assert len(course.figure.layout.shapes) == 2, "the target's band and its mean"
 
 
-def test_a_stored_heap_needs_no_glimpse(run_folder: Path, small_study: Study, cone: Cone) -> None:
+def test_a_stored_heap_needs_no_preview(run_folder: Path, small_study: Study, cone: Cone) -> None:
     journal = begin(run_folder, small_study, cone)
     Store(run_folder / "cases").save("c" * 64, cone())
     journal.ended("c" * 64, {"status": "finished", "reason": "", "angle": 31.0})

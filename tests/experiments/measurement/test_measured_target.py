@@ -11,10 +11,9 @@ import pytest
 from drawn_heaps import Camera, DrawnHeap, draw
 
 from doe import Sample
-from experiments.commands.early import check_calibration_file
 from experiments.io.errors import InputError
 from experiments.measurement.measured_target import with_measurements
-from experiments.runs.campaign import check_runs
+from experiments.runs.choices import check_campaign, measured_study
 from experiments.studyfile import Study, load_study
 from imaging import measure_photograph, save_picture
 
@@ -125,16 +124,16 @@ def test_a_copy_of_a_photograph_is_refused_with_both_before_anything_is_measured
     study = from_source('pictures = "photos"')
     message = r"target.pictures: picture 3: .*heap-2.png is a copy of .*heap-0.png"
     with pytest.raises(InputError, match=message):
-        check_runs(study)
+        measured_study(study)
     with pytest.raises(InputError, match=message):
-        check_calibration_file(study.file)
+        check_campaign(study)
 
 
 def test_every_picture_without_a_heap_is_named(from_source, photographs: list[Path]) -> None:
     for path in photographs[:2]:
         save_picture(path, np.full((300, 500, 3), 200 + int(path.stem[-1]), np.uint8))
     with pytest.raises(InputError, match=r"needs two .*heap-0.*contrast.*heap-1.*contrast.*, got 1"):
-        check_runs(from_source('pictures = "photos"'))
+        measured_study(from_source('pictures = "photos"'))
 
 
 def test_a_phones_heic_in_the_folder_is_not_passed_over(from_source, photographs: list[Path]) -> None:
@@ -213,7 +212,7 @@ def test_measurements_that_cannot_be_used_are_refused(
     from_source, source: str, place: str, rule: str
 ) -> None:
     with pytest.raises(InputError) as error:
-        check_runs(from_source(source))
+        measured_study(from_source(source))
     assert rule in error.value.problem
     assert error.value.place.endswith(place)
 

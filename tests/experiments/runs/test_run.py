@@ -27,9 +27,10 @@ from experiments.cases.workers import own
 from experiments.discover.search import Search
 from experiments.io.errors import InputError
 from experiments.measurement.case_observables import Observed
-from experiments.runs import campaign as run
-from experiments.runs.campaign import Desk
-from experiments.runs.lasting import BANK, OUTCOMES
+from experiments.runs import calibration as run
+from experiments.runs.choices import prepare
+from experiments.runs.request import RunRequest
+from experiments.runs.run_folder import BANK, OUTCOMES
 from experiments.studyfile import Study, load_study
 
 SLOPE = 30.0
@@ -37,7 +38,7 @@ SLOPE = 30.0
 
 
 class Engine:
-    """Stands in for the simulator: counts its cases, and stops dead after as many as it is told."""
+    """Stands in for the simulator: counts its cases, and stops after a number of them."""
 
     def __init__(self, heap: CaseResult) -> None:
         self.heap = heap
@@ -84,7 +85,8 @@ def study(write_study: Callable[..., Path]) -> Study:
 def run_campaign(
     study: Study, folder: Path, resume: bool = False, on_stage: StageHook | None = None
 ) -> Campaign:
-    return run.run_campaign(Desk.open(study, folder, resume=resume), on_stage)
+    prepared = prepare(study, RunRequest(out=folder, device="cpu", resume=resume))
+    return run.run_calibration(prepared, on_stage).campaign
 
 
 def same_findings(a: Campaign, b: Campaign) -> bool:
@@ -112,27 +114,12 @@ def test_a_campaign_leaves_its_report_results_and_tables(
         "cases",
         "wall_times.csv",
         "material.toml",
+        ".live",
+        ".lock",
     } == {p.name for p in folder.iterdir()}
     results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     assert results["campaign"]["outcome"] == "calibrated"
     assert len(list((folder / "cases").iterdir())) == len(engine.seeds) == len(campaign.cases)
-
-
-@pytest.mark.usefixtures("_without_report")
-@pytest.mark.parametrize("stop_after", [0, 1, 7, 20, 30])
-def test_an_interrupted_campaign_goes_on_and_repeats_nothing(
-    study: Study, engine: Engine, tmp_path: Path, stop_after: int
-) -> None:
-    whole = run_campaign(study, tmp_path / "whole")
-    total, engine.seeds = len(engine.seeds), []
-    engine.stop_after = stop_after
-    with pytest.raises(KeyboardInterrupt):
-        run_campaign(study, tmp_path / "cut")
-    engine.stop_after = math.inf
-    resumed = run_campaign(study, tmp_path / "cut", resume=True)
-    assert same_findings(resumed, whole)
-    assert len(engine.seeds) == total
-    assert len(set(engine.seeds)) == total
 
 
 @pytest.mark.usefixtures("_without_report")
@@ -243,23 +230,3 @@ def test_a_bank_that_a_person_brought_is_left_alone(study: Study, tmp_path: Path
     run_campaign(study, tmp_path / "out", resume=True)
     assert (tmp_path / "out" / BANK).is_file()
     assert BANK not in listed(tmp_path / "out")
-
-
-def test_the_papers_runs_stand_beside_the_campaign_and_in_the_record(engine: Engine, tmp_path: Path) -> None:
-    rough = {"measurement": {"azimuths": 2, "pixels": 200}}  # the picture of heaps in less time
-    study, folder = load_study(scale="bench", changes=rough), tmp_path / "out"
-    desk = Desk.open(study, folder)
-    replay = run.replay_published(desk, 1)
-    assert len(engine.seeds) == 34
-    campaign = run.run_campaign(desk, replay=replay)
-    page = run.record_published(desk, replay, campaign)
-    agreement = pd.read_csv(folder / "tables" / "paper_agreement.csv")
-    assert agreement["runs"].tolist() == [12, 6, 13, 3, 31]
-    assert 'id="replay"' in (folder / "report.html").read_text(encoding="utf-8")
-    assert campaign.reason in page.read_text(encoding="utf-8")
-    assert (folder / "record" / "heaps.png").is_file()
-    total, found = len(engine.seeds), run.found_by(campaign, replay)
-    assert json.loads(json.dumps(found))["paper"]["paper_agreement"][-1]["runs"] == 31
-    again = run.replay_published(Desk.open(study, folder, resume=True), 1)
-    pd.testing.assert_frame_equal(again.cases, replay.cases)
-    assert len(engine.seeds) == total

@@ -16,13 +16,14 @@ from typer.testing import CliRunner
 
 from dem_warp import CaseResult, Drum, Hopper
 from dem_warp.scenes.drum_surface import STATIONS
-from experiments.calibrate import Outcome
+from experiments.calibrate import Campaign, Outcome
 from experiments.cases import OwnWorkers, Store, execute, run_cases
 from experiments.cases.workers import own
 from experiments.cli import app
 from experiments.measurement.case_observables import Observed
-from experiments.runs import campaign as run
-from experiments.runs.campaign import Desk, check_runs
+from experiments.runs import calibration as run
+from experiments.runs.choices import measured_study, prepare
+from experiments.runs.request import RunRequest
 from experiments.studyfile import Study, load_study
 
 BIN = """
@@ -74,16 +75,13 @@ def test_one_case_of_a_further_scene_is_shown_alone(study: Study, tmp_path: Path
 
 
 class Engine:
-    """Stands in for the simulator: heaps and bins that follow the friction, and stops when it is told."""
+    """Stands in for the simulator: heaps and bins that follow the friction."""
 
     def __init__(self, heap: CaseResult) -> None:
-        self.heap, self.count, self.stop_after = heap, 0, math.inf
+        self.heap = heap
 
     def __call__(self, cases, *, on_result, **_) -> None:
         for index, case in enumerate(cases):
-            if self.count >= self.stop_after:
-                raise KeyboardInterrupt
-            self.count += 1
             friction, noise = case.grain_grain.static_friction, math.sin(12.9898 * case.seed)
             seen = {"grain_count": 30.0, "simulated_time": 1.5}
             if isinstance(case.scene, Drum):
@@ -115,6 +113,11 @@ def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> 
     return engine
 
 
+def calibrated(study: Study, folder: Path) -> Campaign:
+    prepared = prepare(study, RunRequest(out=folder, device="cpu"))
+    return run.run_calibration(prepared).campaign
+
+
 DRUM = """
 [scene.drum]
 diameter = "60 mm"
@@ -137,8 +140,8 @@ def test_a_drums_angle_may_be_the_only_target(write_study: Callable[..., Path], 
         '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n',
     )
     study = load_study(write_study(*((text, "") for text in heap), add=DRUM))
-    check_runs(study)
-    found = run.run_campaign(Desk.open(study, tmp_path / "out"))
+    measured_study(study)
+    found = calibrated(study, tmp_path / "out")
     assert found.outcome in (Outcome.CALIBRATED, Outcome.NOT_TOLD_APART)
     assert [response.name for response in found.responses] == ["dynamic_angle"]
     # The stand-in engine turns 15 + 50 x friction: the target lies at 0.5, known to a fifth of a degree.
@@ -147,17 +150,9 @@ def test_a_drums_angle_may_be_the_only_target(write_study: Callable[..., Path], 
     assert "dynamic angle of 40.00°" in page
 
 
-def test_an_interrupted_campaign_of_two_scenes_goes_on_to_the_same_end(
-    study: Study, engine: Engine, tmp_path: Path
-) -> None:
-    whole = run.run_campaign(Desk.open(study, tmp_path / "whole"))
-    total, engine.count, engine.stop_after = engine.count, 0, 25
-    with pytest.raises(KeyboardInterrupt):
-        run.run_campaign(Desk.open(study, tmp_path / "cut"))
-    engine.stop_after = math.inf
-    resumed = run.run_campaign(Desk.open(study, tmp_path / "cut", resume=True))
-    assert engine.count == total == len(whole.cases)
-    assert json.dumps(resumed.to_dict()) == json.dumps(whole.to_dict())
+@pytest.mark.usefixtures("engine")
+def test_a_campaign_of_two_scenes_matches_both(study: Study, tmp_path: Path) -> None:
+    whole = calibrated(study, tmp_path / "whole")
     assert whole.outcome in (Outcome.CALIBRATED, Outcome.NOT_TOLD_APART)
     # Three standard errors of five cases through the slope: 0.5 / sqrt(5) deg over 30 deg, twice.
     assert whole.optimum.point["E"] == pytest.approx(0.45, abs=0.03)
@@ -198,10 +193,10 @@ def test_the_profiles_of_a_drum_may_be_the_only_target(
         '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n',
         '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n',
     )
-    study = check_runs(load_study(write_study(*((text, "") for text in heap), add=PROFILES)))
+    study = measured_study(load_study(write_study(*((text, "") for text in heap), add=PROFILES)))
     names = [response.name for response in study.target.responses]
     # Stations from -0.6 to 0.6 of 30 mm lie within the 20 mm that were measured.
     assert names == [f"surface_mode_{number}" for number in range(1, 8)]
     assert {name for name, _ in study.target.leading.weights} == {f"surface_{i}" for i in range(2, 9)}
-    found = run.run_campaign(Desk.open(study, tmp_path / "out"))
+    found = calibrated(study, tmp_path / "out")
     assert found.optimum.point["E"] == pytest.approx(0.5, abs=0.02)

@@ -36,7 +36,7 @@ from experiments.cases import Store
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.grains.clumps.clump_maker import ClumpRequest, make_clump
 from experiments.io.errors import InputError
-from experiments.journal.glimpses import Glimpses, read_glimpse
+from experiments.journal.previews import Previews, read_preview
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
 from experiments.measurement.value_limits import ValueLimits
@@ -224,15 +224,15 @@ def sqlite(folder: Path) -> Reader:
     )
 
 
-def glimpse(folder: Path) -> Reader:
-    """Glimpses of running cases."""
+def preview(folder: Path) -> Reader:
+    """Previews of running cases."""
     [result] = simulate([_case()], "cpu", 1)
-    Glimpses(folder / "glimpses").write("seed", result, {"phase": "lift", "fraction": 0.5})
-    content = (folder / "glimpses" / "seed.npz").read_bytes()
-    spheres, told = read_glimpse(folder / "glimpses" / "seed.npz")
+    Previews(folder / "previews").write("seed", result, {"phase": "lift", "fraction": 0.5})
+    content = (folder / "previews" / "seed.npz").read_bytes()
+    spheres, told = read_preview(folder / "previews" / "seed.npz")
 
     def read(path: Path) -> dict[str, Any]:
-        found, words = read_glimpse(path)
+        found, words = read_preview(path)
         return {"spheres": found, **words}
 
     facts = {"spheres": spheres, **told}
@@ -251,7 +251,7 @@ READERS: dict[str, Callable[[Path], Reader]] = {
     "stored case": stored,
     "checkpoint": checkpoint,
     "sqlite": sqlite,
-    "glimpse": glimpse,
+    "preview": preview,
 }
 """Every reader by its name: made ready in a folder of its own."""
 

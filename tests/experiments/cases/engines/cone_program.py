@@ -36,7 +36,7 @@ def main(way=""):
     angle = foot + slope * case["contact"]["grain-grain"]["static_friction"] + noise
     lines = [f"{x:.9g},{y:.9g},{z:.9g},{RADIUS}" for x, y, z in cone(math.tan(math.radians(angle)))]
     Path("heap.csv").write_text("\n".join(["x,y,z,r", *lines]) + "\n", encoding="utf-8")
-    told = {"status": "finished", "program": "cones 1.0", "observables": {"grain_count": len(lines)}}
+    answer = {"status": "finished", "program": "cones 1.0", "observables": {"grain_count": len(lines)}}
     match mode:
         case "nan":
             Path("heap.csv").write_text("x,y,z,r\n0,0,nan,0.001\n", encoding="utf-8")
@@ -47,19 +47,19 @@ def main(way=""):
         case "high":
             Path("heap.csv").write_text("x,y,z,r\n0,0,0.1,0.001\n", encoding="utf-8")
         case "diverged":
-            told = {"status": "diverged", "reason": "a grain was too fast"}
+            answer = {"status": "diverged", "reason": "a grain was too fast"}
         case "status":
-            told = {"status": "fine"}
+            answer = {"status": "fine"}
         case "observable":
-            told["observables"] = {"grain_cuont": 3}
+            answer["observables"] = {"grain_cuont": 3}
         case "infinite":
-            told["observables"] = {"grain_count": float("inf")}
+            answer["observables"] = {"grain_count": float("inf")}
         case "huge":
-            told["observables"] = {"grain_count": 10**400}
+            answer["observables"] = {"grain_count": 10**400}
         case "deep":
             Path("result.json").write_text("[" * 100_000, encoding="utf-8")
             return
-    Path("result.json").write_text(json.dumps(told), encoding="utf-8")
+    Path("result.json").write_text(json.dumps(answer), encoding="utf-8")
 
 
 main(*sys.argv[1:])

@@ -52,18 +52,23 @@ def test_a_case_is_told_in_si_with_its_clump_and_its_walls(write_study: Write, t
     study = load_study(write_study(('sphere = "2 mm"', 'clump = "pair.txt"')))
     case = study.case({"E": 0.37}, seed=7)
     write_case(case, tmp_path / "case")
-    told = json.loads((tmp_path / "case" / "case.json").read_text())
-    assert (told["seed"], told["gravity"]) == (7, [0.0, 0.0, -9.81])
-    assert told["contact"]["grain-grain"]["static_friction"] == 0.37
-    assert told["scene"] | {"kind": "lifted-cylinder", "diameter": 0.028, "height": 0.028} == told["scene"]
-    assert told["grain"]["material"]["shear_modulus"] == pytest.approx(10e6 / 400)
-    [shape], [entry] = case.grains.mixture.shapes, told["grain"]["clumps"]
+    document = json.loads((tmp_path / "case" / "case.json").read_text())
+    assert (document["seed"], document["gravity"]) == (7, [0.0, 0.0, -9.81])
+    assert document["contact"]["grain-grain"]["static_friction"] == 0.37
+    assert (
+        document["scene"] | {"kind": "lifted-cylinder", "diameter": 0.028, "height": 0.028}
+        == document["scene"]
+    )
+    assert document["grain"]["material"]["shear_modulus"] == pytest.approx(10e6 / 400)
+    [shape], [entry] = case.grains.mixture.shapes, document["grain"]["clumps"]
     assert entry["mass"] == pytest.approx(700 * shape.volume)
     with (tmp_path / "case" / entry["file"]).open() as file:
         rows = [[float(row[name]) for name in "xyzr"] for row in csv.DictReader(file)]
     np.testing.assert_array_equal(rows, np.column_stack([shape.centers, shape.radii]))
-    assert [wall["kind"] for wall in told["walls"]] == ["plane", "cylinder"]
-    assert all((tmp_path / "case" / wall["file"]).read_text().startswith("solid") for wall in told["walls"])
+    assert [wall["kind"] for wall in document["walls"]] == ["plane", "cylinder"]
+    assert all(
+        (tmp_path / "case" / wall["file"]).read_text().startswith("solid") for wall in document["walls"]
+    )
 
 
 def test_triangles_of_a_tube_have_its_area(small_study: Study) -> None:
@@ -135,7 +140,7 @@ def test_several_cases_run_at_once_and_come_back_in_order(small_study: Study, tm
 @pytest.mark.parametrize(
     ("way", "status", "reason"),
     [
-        ("crash", NO_ANSWER, "the exit code 1; its last words: no license was found"),
+        ("crash", NO_ANSWER, "the exit code 1; its last line: no license was found"),
         ("silent", NO_ANSWER, "the program wrote no result.json"),
         ("nan", NO_ANSWER, "heap.csv, line 2: a sphere must be x y z r"),
         ("words", NO_ANSWER, "heap.csv, line 2: a sphere must be x y z r"),
@@ -206,7 +211,7 @@ def test_an_interrupt_ends_the_programs_and_loses_no_finished_case(
     [
         (
             'command = "no-such-solver --case x"',
-            "must begin with a program that can be run",
+            "must begin with a program on the PATH",
             "engine.command",
         ),
         ('command = "\'open"', "must close every quotation mark", "engine.command"),
@@ -217,7 +222,7 @@ def test_an_interrupt_ends_the_programs_and_loses_no_finished_case(
         ('command = "python3"\nworkers = 0', "must be greater than or equal to 1", "engine.workers"),
         ('command = "python3"\ntime_limit = "0 s"', "must be greater than 0", "engine.time_limit"),
         ('command = "python3"\nobservables = ["angle"]', "the heap shows the others", "engine.observables"),
-        ('name = "liggghts"\nversion = "2"', "belong to a command", "engine"),
+        ('name = "liggghts"\nversion = "2"', "settings of a command", "engine"),
     ],
 )
 def test_a_wrong_engine_is_refused_with_rule_and_place(
@@ -258,8 +263,8 @@ def test_a_case_of_a_mixture_names_every_clump(write_study: Write, tmp_path: Pat
     study = load_study(write_study(('sphere = "2 mm"\n', ""), add=f"\n{parts}"))
     case: Case = study.case({}, 1)
     write_case(case, tmp_path / "case")
-    told = json.loads((tmp_path / "case" / "case.json").read_text())["grain"]["clumps"]
-    assert [(entry["file"], entry["fraction"]) for entry in told] == [
+    document = json.loads((tmp_path / "case" / "case.json").read_text())["grain"]["clumps"]
+    assert [(entry["file"], entry["fraction"]) for entry in document] == [
         ("clump-1.csv", 0.75),
         ("clump-2.csv", 0.25),
     ]

@@ -1,13 +1,8 @@
-"""Campaigns and searches on a program of one's own: whole, interrupted, resumed, and refused."""
+"""Cases and searches on a program of one's own: kept, repeated where it fails, and refused."""
 
 from __future__ import annotations
 
-import json
-import os
-import signal
-import subprocess
 import sys
-import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -17,15 +12,11 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from experiments import api
-from experiments.cases import OwnWorkers
-from experiments.cases.engines.contract import command_program
-from experiments.cases.engines.program import ProgramEngine
+from experiments.cases import OwnWorkers, Store, engine_of, run_cases
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cli import app
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
-from experiments.measurement.case_observables import measure
 from experiments.studyfile import load_study
 from experiments.studyfile.observables import PHOTOGRAPHED
 
@@ -41,57 +32,18 @@ def runs(path: Path) -> Counter[str]:
     return Counter((path / "runs.txt").read_text().split())
 
 
-def test_a_campaign_runs_on_a_program_and_reports_it(write_study: Write, tmp_path: Path) -> None:
-    study, out = write_study(add=section(more="workers = 2")), tmp_path / "out"
-    ended = api.calibrate(study, out, device="cpu")
-    assert ended.campaign is not None
-    assert ended.campaign.outcome == "calibrated"
-    # 15 degrees and 30 more for a friction of 1, aim 30: half; a heap of these cones reads a degree off.
-    assert ended.campaign.optimum is not None
-    assert ended.campaign.optimum.point["E"] == pytest.approx(0.5, abs=0.05)
-    results = json.loads((out / "results.json").read_text())
-    assert results["provenance"]["engine"]["program"] == "cones 1.0"
-    assert set(runs(out / "cases").values()) == {1}, "every case ran once"
-    assert not (out / "cases" / "unfinished").exists()
-
-
-def test_a_killed_campaign_goes_on_without_losing_or_repeating_a_case(
-    write_study: Write, tmp_path: Path
-) -> None:
-    study, out = write_study(add=section(more="workers = 2")), tmp_path / "out"
-    words = ["calibrate", str(study), "--out", str(out), "--device", "cpu"]
-    order = [sys.executable, "-c", f"from experiments.cli import app; app({words!r})"]
-    first = subprocess.Popen(order, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    stored, deadline = out / "cases", time.monotonic() + 120.0
-    while len(list(stored.glob("[!.]*.npz"))) < 3 and first.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.01)
-    os.kill(first.pid, signal.SIGKILL)
-    first.wait()
-    kept = {path.name for path in stored.glob("[!.]*.npz")}
-    assert len(kept) >= 3
-    ended = api.calibrate(study, out, device="cpu", resume=True)
-    assert ended.campaign is not None
-    assert kept <= {path.name for path in stored.glob("[!.]*.npz")}
-    counts = runs(stored)
-    # Those that ran when the campaign was killed, two at the most, began twice.
-    assert sum(count - 1 for count in counts.values()) <= 2
-    assert len(counts) == len(ended.campaign.cases)
-
-
-def test_cases_that_the_program_fails_at_are_rows_and_are_tried_again(
-    write_study: Write, tmp_path: Path
-) -> None:
-    study, out = write_study(add=section("crash")), tmp_path / "out"
-    ended = api.calibrate(study, out, device="cpu")
-    assert ended.campaign is not None
-    assert ended.campaign.outcome == "too-many-failed-runs"
-    cases = ended.campaign.cases
-    assert set(cases["status"]) == {"no-answer"}
-    assert cases["reason"].str.contains("no license was found").all()
-    assert list((out / "cases" / "failed").iterdir())
-    again = api.calibrate(study, out, device="cpu", resume=True)
-    assert again.campaign is not None
-    assert set(runs(out / "cases").values()) == {2}
+def test_cases_of_a_program_are_stored_and_its_failures_repeated(write_study: Write, tmp_path: Path) -> None:
+    study, store = load_study(write_study(add=section("crash-odd"))), tmp_path / "cases"
+    table = pd.DataFrame({"seed": [2, 1, 4], "E": [0.3, 0.4, 0.5]})
+    for attempt in (1, 2):
+        cases = run_cases(study, table, Store(store, engine_of(study)), OwnWorkers("cpu", 2))
+        assert cases["status"].tolist() == ["finished", "no-answer", "finished"]
+        assert "no license was found" in cases["reason"][1]
+        # 15 degrees and 30 more for a friction of 1; a heap of these cones reads a degree off
+        assert cases["angle"].dropna().tolist() == pytest.approx([24.0, 30.0], abs=1.5)
+        assert runs(tmp_path / "cases") == {"2": 1, "4": 1, "1": attempt}
+        assert len(list((store / "failed").iterdir())) == 1
+    assert not (store / "unfinished").exists()
 
 
 def test_a_search_asks_a_program_and_keeps_what_it_answers(write_study: Write, tmp_path: Path) -> None:
@@ -119,40 +71,11 @@ def test_a_search_asks_a_program_and_keeps_what_it_answers(write_study: Write, t
     assert runs(tmp_path / "out") == {"2": 1, "4": 1, "1": 2}
 
 
-@pytest.mark.usefixtures("_one_thread")
-def test_discover_searches_with_a_program(write_study: Write, tmp_path: Path) -> None:
-    settings = "settings = { bank_points = 10, bank_mechanism_points = 6 }"
-    search = f'\n[discover]\nmechanisms = ["contact_adhesion"]\n{settings}\n'
-    path = write_study(add=section(more="workers = 2") + search)
-    study = load_study(path)
-    engine = ProgramEngine(command_program(f"'{sys.executable}' '{CONES}'", Path(), "command"))
-    heaps = engine([study.case({"E": 0.4}, seed) for seed in range(101, 105)])
-    rows = [
-        {"condition": "base", "replicate": number, "observable": name, "value": value}
-        for number, heap in enumerate(heaps, 1)
-        for name, value in zip(PHOTOGRAPHED, measure(study.measurement, heap, PHOTOGRAPHED)[0], strict=True)
-        if name in ("flank_angle", "height", "r50")
-    ]
-    pd.DataFrame(rows).to_csv(tmp_path / "measured.csv", index=False)
-    words = ["discover", str(path), str(tmp_path / "measured.csv"), "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, [*words, "--device", "cpu", "--json"])
-    assert result.exit_code == 0, result.output
-    found = json.loads(result.stdout)
-    assert found["discovery"]["verdict"] == "none", "the data are of the model itself"
-    assert (tmp_path / "out" / "report.html").is_file()
-
-
-@pytest.fixture
-def _one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-
-
-@pytest.mark.parametrize("command", ["calibrate", "discover"])
 @pytest.mark.parametrize(
-    ("words", "text", "said"),
+    ("command", "words", "text", "said"),
     [
-        (["--engine", "rocky"], "", "engine: must be one of"),
-        ([], '\n[engine]\ncommand = "no-such-solver"\n', "must begin with a program that can be run"),
+        ("calibrate", ["--engine", "rocky"], "", "engine: must be one of"),
+        ("discover", [], '\n[engine]\ncommand = "no-such-solver"\n', "must begin with a program on the PATH"),
     ],
 )
 def test_an_engine_that_is_not_there_ends_with_code_2_and_leaves_nothing(
@@ -165,7 +88,7 @@ def test_an_engine_that_is_not_there_ends_with_code_2_and_leaves_nothing(
     assert said in " ".join(result.stderr.split())
 
 
-def test_a_heap_that_cannot_be_drawn_is_told_with_its_reason(write_study: Write, tmp_path: Path) -> None:
+def test_a_heap_that_cannot_be_drawn_has_a_reason(write_study: Write, tmp_path: Path) -> None:
     study, out = write_study(add=section("high")), tmp_path / "out"
     result = CliRunner().invoke(app, ["heap", str(study), "--out", str(out), "--device", "cpu"])
     assert result.exit_code == 1

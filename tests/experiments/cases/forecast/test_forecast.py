@@ -23,7 +23,7 @@ from experiments.cases.forecast.speed import (
     noted_speed,
 )
 from experiments.cases.forecast.work import Work, work_of
-from experiments.cases.workers.wave import Wave, WaveProgress
+from experiments.cases.workers.call_results import CallResults, ExpectedProgress
 from experiments.commands.console import describe_progress
 from experiments.studyfile import Study
 
@@ -151,7 +151,7 @@ def test_a_finished_batch_notes_its_speed(small_study: Study, monkeypatch: pytes
 
 
 def test_cases_that_failed_early_leave_no_speed(small_study: Study) -> None:
-    wave = Wave([small_study.case({}, 1)], None, None)
+    wave = CallResults([small_study.case({}, 1)], None, None)
     wave._begun = (0.1, 0.0)
     for status, part in (("finished", 0.9), ("failed", 0.0)):
         wave.results = {0: SimpleNamespace(status=status)}  # type: ignore[dict-item]
@@ -159,11 +159,11 @@ def test_cases_that_failed_early_leave_no_speed(small_study: Study) -> None:
 
 
 def test_the_time_left_follows_the_progress_after_a_tenth() -> None:
-    begun = WaveProgress(0, 10, 0.0, {"waiting": 10}, 4.0, expected=100.0)
+    begun = ExpectedProgress(0, 10, 0.0, {"waiting": 10}, 4.0, expected=100.0)
     assert describe_progress(begun).startswith("1 min 36 s left")
-    late = WaveProgress(0, 10, 0.0, {"fill": 2}, 200.0, expected=100.0)
+    late = ExpectedProgress(0, 10, 0.0, {"fill": 2}, 200.0, expected=100.0)
     assert describe_progress(late).startswith("10 s left")
-    half = WaveProgress(5, 10, 0.5, {"lift": 2}, 300.0, expected=100.0)
+    half = ExpectedProgress(5, 10, 0.5, {"lift": 2}, 300.0, expected=100.0)
     assert describe_progress(half).startswith("5 min 0 s left")
-    unknown = WaveProgress(0, 10, 0.0, {}, 4.0)
+    unknown = ExpectedProgress(0, 10, 0.0, {}, 4.0)
     assert "left" not in describe_progress(unknown)

@@ -14,7 +14,7 @@ from experiments.cases import OwnWorkers
 from experiments.cases.forecast.work import work_of
 from experiments.cases.workers import batches, own
 from experiments.cases.workers.batches import device_bytes, plan_batches, relative_work
-from experiments.cases.workers.wave import Wave, WaveProgress
+from experiments.cases.workers.call_results import CallResults, ExpectedProgress
 from experiments.studyfile import Study, load_study
 
 Write = Callable[..., Path]
@@ -26,7 +26,7 @@ def cases(small_study: Study) -> list[Case]:
 
 
 class Stub:
-    """Stands in for the simulator: cases end in a cone, save those that do as they are told."""
+    """Stands in for the simulator: cases end in a cone, or as scripted."""
 
     def __init__(self, cone: Callable[..., CaseResult], faults: dict[int, Exception], room: int = 99) -> None:
         self.cone, self.faults, self.room = cone, faults, room
@@ -172,7 +172,7 @@ def test_progress_is_weighed_by_cost_and_told_from_the_start(
     cases: list[Case], cone: Callable[..., CaseResult]
 ) -> None:
     seen: list[Progress] = []
-    wave = Wave(cases[:2], None, seen.append, expected=40.0)
+    wave = CallResults(cases[:2], None, seen.append, expected=40.0)
     wave.costs = np.array([3.0, 1.0])
     wave.report()
     wave.follow(0, [0, 1], Progress(0, 2, 0.5, {"fill": 2}, 1.0))
@@ -184,5 +184,5 @@ def test_progress_is_weighed_by_cost_and_told_from_the_start(
     assert seen[0].phase_counts == {"waiting": 2}
     assert seen[1].phase_counts == {"fill": 2}
     first = seen[0]
-    assert isinstance(first, WaveProgress)
+    assert isinstance(first, ExpectedProgress)
     assert first.expected == 40.0

@@ -49,10 +49,10 @@ def test_any_split_gives_the_same_bits_and_every_case_is_told_once(
     small_study: Study, two_workers: Workers
 ) -> None:
     cases = made(small_study, 5)
-    told: list[int] = []
+    received: list[int] = []
     progress: list[Progress] = []
-    spread = two_workers.simulate(cases, None, lambda index, _: told.append(index), progress.append)
-    assert sorted(told) == list(range(5))
+    spread = two_workers.simulate(cases, None, lambda index, _: received.append(index), progress.append)
+    assert sorted(received) == list(range(5))
     assert progress[-1].fraction == 1.0
     assert_same_bits(spread, OwnWorkers("cpu", 1).simulate(cases))
     assert_same_bits(spread, OwnWorkers("cpu", 2).simulate(cases[::-1])[::-1])
@@ -69,7 +69,7 @@ def test_workers_that_are_killed_lose_no_case_and_none_is_done_twice(
     cases = made(study, 6)
     assert isinstance(two_workers, DaskWorkers)
     client, hear = two_workers._client, dask_workers._Session._hear
-    told: Counter[int] = Counter()
+    received: Counter[int] = Counter()
     begun: list[int] = []
 
     def kill(session: dask_workers._Session, message: dask_task.Message) -> None:
@@ -82,12 +82,12 @@ def test_workers_that_are_killed_lose_no_case_and_none_is_done_twice(
                     os.kill(process, signal.SIGKILL)
 
     def note(index: int, result: CaseResult) -> None:
-        told[index] += 1
+        received[index] += 1
 
     monkeypatch.setattr(dask_workers._Session, "_hear", kill)
     results = two_workers.simulate(cases, None, note, None, tmp_path / "unfinished")
     assert begun.count(begun[2]) > 1, "it was begun again"
-    assert told == Counter(range(6))
+    assert received == Counter(range(6))
     assert "a worker was lost" in caplog.text
     assert_same_bits(results, OwnWorkers("cpu", 2).simulate(cases))
 
@@ -309,12 +309,12 @@ def test_a_gpu_has_one_worker_alone_and_several_beside_others_or_as_many_as_aske
 def test_workers_of_a_gpu_share_its_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     free = {"GPU-a": 8.0e10, "GPU-b": 5.0e10}
     homes = ["GPU-a", "GPU-b", "GPU-a"]
-    told = {str(i): {"identity": home, "memory": free[home]} for i, home in enumerate(homes)}
-    client: Any = SimpleNamespace(run=lambda *_, **__: told)
+    described = {str(i): {"identity": home, "memory": free[home]} for i, home in enumerate(homes)}
+    client: Any = SimpleNamespace(run=lambda *_, **__: described)
     workers = DaskWorkers(client, {}, "two GPUs", 3)
     assert workers._shares() == (4.0e10, 2)
     assert (workers.on_gpu, workers.sharing) == (True, 2)
-    told["3"] = {"identity": None, "memory": None}
+    described["3"] = {"identity": None, "memory": None}
     assert (workers.on_gpu, workers.sharing) == (False, 1)
 
 

@@ -19,7 +19,7 @@ from commandline import dem_warp
 from experiments.cases import Resources
 from experiments.cases.workers import dask_workers
 from experiments.cases.workers.dask_workers import DaskWorkers
-from experiments.cases.workers.submissions import Submissions, words_of
+from experiments.cases.workers.submissions import Submissions, message_of
 from experiments.cases.workers.workers import WorkersLostError
 from experiments.io.errors import InputError
 from experiments.runs.examination import _submission
@@ -60,7 +60,7 @@ def test_without_the_command_that_submits_nothing_is_written(
     assert not (tmp_path / "shared").exists()
 
 
-def test_jobs_that_are_refused_end_the_command_in_the_words_of_the_batch_system(
+def test_jobs_that_are_refused_end_the_command_in_the_message_of_the_batch_system(
     write_study: Callable[..., Path], profile: Path, tmp_path: Path
 ) -> None:
     """A process of its own, as Dask would print its tracebacks when that ends."""
@@ -148,10 +148,10 @@ def test_a_run_whose_last_jobs_are_refused_ends(monkeypatch: pytest.MonkeyPatch)
 
 def test_words_are_what_the_batch_system_prints() -> None:
     head = "Command exited with non-zero exit code.\nExit code: 1\nCommand:\nsbatch job.sh"
-    assert words_of(RuntimeError(f"{head}\nstdout:\n\nstderr:\none\ntwo\n\n")) == "one two"
-    assert words_of(RuntimeError(f"{head}\nstdout:\nonly this\nstderr:\n\n")) == "only this"
-    assert words_of(FileNotFoundError(2, "No such file", "bsub")) == "[Errno 2] No such file: 'bsub'"
-    assert words_of(OSError()) == "OSError"
+    assert message_of(RuntimeError(f"{head}\nstdout:\n\nstderr:\none\ntwo\n\n")) == "one two"
+    assert message_of(RuntimeError(f"{head}\nstdout:\nonly this\nstderr:\n\n")) == "only this"
+    assert message_of(FileNotFoundError(2, "No such file", "bsub")) == "[Errno 2] No such file: 'bsub'"
+    assert message_of(OSError()) == "OSError"
 
 
 def test_the_doctor_says_whether_jobs_can_be_submitted(

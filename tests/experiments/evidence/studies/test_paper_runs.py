@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -18,11 +17,8 @@ from experiments.evidence.studies.buckwheat.replay.runs import (
     planned_cases,
     published_runs,
 )
-from experiments.io.errors import StudyError
-from experiments.runs import campaign as run
-from experiments.runs.campaign import Desk, check_runs, replay_published
 from experiments.studies.buckwheat import paper
-from experiments.studyfile import Study, load_study
+from experiments.studyfile import load_study
 
 
 def simulated(angle: Callable[[pd.DataFrame], pd.Series], replicates: int = 1) -> Replay:
@@ -155,33 +151,6 @@ def test_failed_cases_are_left_out() -> None:
     assert runs.loc[("screening", 4), "n"] == 0
     assert runs.loc[("climb", 2), "n"] == 1
     assert len(replay.screening.response) == 22
-
-
-def test_each_stage_is_one_batch_and_its_wall_time_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    batches = []
-
-    def run_cases(study: Study, table: pd.DataFrame, *_: object) -> pd.DataFrame:
-        batches.append(table["stage"].unique().tolist())
-        (tmp_path / "out/cases").mkdir(exist_ok=True)
-        if len(batches) < 3:  # as if the rest were stored from an earlier run
-            (tmp_path / f"out/cases/{len(batches)}.npz").touch()
-        return table.assign(status="finished", reason="", angle=table["published"], case_key="")
-
-    monkeypatch.setattr(run, "run_cases", run_cases)
-    desk = Desk.open(load_study(scale="bench"), tmp_path / "out")
-    replay = replay_published(desk, 2)
-    assert batches == [[stage] for stage in STAGES]
-    assert len(replay.cases) == 2 * 34
-    assert desk.wall_times["stage"].tolist() == ["paper, screening", "paper, climb"]
-    assert desk.wall_times["simulated"].tolist() == [1, 1]
-
-
-def test_only_the_papers_study_has_its_runs(small_study: Study) -> None:
-    with pytest.raises(StudyError, match=r"small.toml: only a study whose companion has published runs"):
-        check_runs(small_study, paper=True)
-    check_runs(load_study(scale="bench"), paper=True)
 
 
 def test_the_designs_are_the_31_runs() -> None:

@@ -18,7 +18,7 @@ from experiments.calibrate.noise_stage import plan_noise_floor
 from experiments.discover.mechanism_files import library_for
 from experiments.io.plain_data import jsonable
 from experiments.report.discovery import Terms, write_discovery
-from experiments.runs.campaign import check_runs
+from experiments.runs.choices import measured_study
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import BY_NAME, OBSERVABLES
@@ -74,7 +74,7 @@ def test_the_study_with_the_mechanism_loads_and_can_be_calibrated(
     found = replace(found, chosen=replace(found.chosen, sizes=(size,)))
     write_discovery(found, trial, trial_terms, Settings(), tmp_path)
     study = load_study(tmp_path / "study-with-contact_adhesion.toml")
-    check_runs(study)
+    measured_study(study)
     added = study.factors[-1]
     assert added.name == "contact_adhesion"
     # Written with four digits; the interval ends where the library does.

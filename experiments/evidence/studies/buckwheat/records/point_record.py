@@ -31,7 +31,7 @@ from experiments.io.errors import InputError
 from experiments.io.files import copy_file, existing, write_text
 from experiments.report.kit.numbers import prose
 from experiments.report.response_tables import response_tables
-from experiments.runs.campaign import WALL_TIMES_FILE
+from experiments.runs.run_folder import WALL_TIMES_FILE
 from experiments.studies.buckwheat import paper
 from experiments.studyfile import Study, load_study
 

@@ -1,4 +1,4 @@
-"""One call of workers: what its batches have given so far, and how far they are."""
+"""Results and progress of one call of workers, collected from its batches."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from experiments.cases.workers.batches import relative_work
 
 
 @dataclass(frozen=True)
-class WaveProgress(Progress):
-    """Progress of a wave."""
+class ExpectedProgress(Progress):
+    """Progress of a call, with the wall time that was predicted."""
 
     expected: float | None = None
-    """Wall time of all of it, as predicted before it began [s]; None where it could not be."""
+    """Wall time of the call, predicted before it began [s]; None if it could not be."""
 
 
-class Wave:
-    """Results and progress of a call, gathered from its batches.
+class CallResults:
+    """Results and progress of a call, collected from its batches.
 
     Parameters
     ----------
     cases
         All cases of the call.
     on_result, on_progress
-        As of `Workers.simulate`; errors of theirs end the call.
+        See `Workers.simulate`; their errors end the call.
     expected
         Predicted wall time of all [s].
     """
@@ -46,7 +46,7 @@ class Wave:
         """Predicted work of each case, (n,)."""
         self.results: dict[int, CaseResult] = {}
         self.fault: BaseException | None = None
-        """Error of the caller's own functions."""
+        """Error of the caller's functions."""
         self._on_result, self._on_progress, self._expected = on_result, on_progress, expected
         self._started = time.perf_counter()
         self._fractions = np.zeros(len(cases))
@@ -55,7 +55,7 @@ class Wave:
 
     @property
     def is_complete(self) -> bool:
-        """Tell that every case has given its result."""
+        """True if every case has given its result."""
         return len(self.results) == len(self.costs)
 
     @property
@@ -74,7 +74,7 @@ class Wave:
         return 1.0 if self.is_complete else float(self.costs @ self._fractions / self.costs.sum())
 
     def left(self, members: Sequence[int]) -> list[int]:
-        """Members of a batch that have given no result yet."""
+        """Return the members of a batch that have given no result yet."""
         return [index for index in members if index not in self.results]
 
     def take(self, index: int, result: CaseResult) -> None:
@@ -87,7 +87,7 @@ class Wave:
             self._call(self._on_result, index, result)
 
     def follow(self, batch: int, members: Sequence[int], progress: Progress) -> None:
-        """Take the progress of some members of a batch, and tell that of all."""
+        """Take the progress of some members of a batch, and report that of all."""
         if left := self.left(members):
             ended = len(members) - len(left)
             self._fractions[left] = np.clip((progress.fraction * len(members) - ended) / len(left), 0.0, 1.0)
@@ -97,12 +97,12 @@ class Wave:
         self.report()
 
     def end(self, batch: int) -> None:
-        """Note that a batch has ended, and tell how far all is."""
+        """Note that a batch has ended, and report the progress of all."""
         self._phases.pop(batch, None)
         self.report()
 
     def report(self) -> None:
-        """Tell how far all is."""
+        """Report the progress of all."""
         if self._on_progress is None:
             return
         done, total = len(self.results), len(self.costs)
@@ -112,11 +112,11 @@ class Wave:
         if (waiting := total - done - phases.total()) > 0:
             phases["waiting"] += waiting
         seconds = time.perf_counter() - self._started
-        progress = WaveProgress(done, total, self._fraction, dict(phases), seconds, self._expected)
+        progress = ExpectedProgress(done, total, self._fraction, dict(phases), seconds, self._expected)
         self._call(self._on_progress, progress)
 
     def in_order(self) -> list[CaseResult]:
-        """Results of all cases."""
+        """Return the results of all cases."""
         return [self.results[index] for index in range(len(self.costs))]
 
     def _call(self, function: Callable[..., None], *arguments: object) -> None:

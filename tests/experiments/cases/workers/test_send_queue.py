@@ -15,7 +15,7 @@ from dem_warp import Case, Progress
 from experiments.cases.engines.program import empty_result
 from experiments.cases.workers import dask_task
 from experiments.cases.workers.dask_task import GoneError, Message, Order, fingerprint_of, simulate_batch
-from experiments.cases.workers.outbox import MOST, Outbox
+from experiments.cases.workers.send_queue import MOST, SendQueue
 from experiments.studyfile import Study
 
 PATIENCE = 10.0
@@ -31,7 +31,7 @@ class Sent:
 
     def put(self, messages: list[Any]) -> None:
         self.begun.set()
-        assert self.free.wait(PATIENCE), "who gives messages waited until they were sent"
+        assert self.free.wait(PATIENCE), "who puts messages waited until they were sent"
         self.packs.append(messages)
 
     @property
@@ -41,11 +41,11 @@ class Sent:
 
 def test_what_gathers_while_a_message_is_sent_leaves_as_one() -> None:
     sent = Sent()
-    with Outbox(sent.put) as outbox:
-        outbox.give(0)
+    with SendQueue(sent.put) as queue:
+        queue.put(0)
         assert sent.begun.wait(PATIENCE)
         for number in range(1, MOST + 5):
-            outbox.give(number)
+            queue.put(number)
         sent.free.set()
     assert sent.all == list(range(MOST + 5))
     assert [len(pack) for pack in sent.packs] == [1, MOST, 4]
@@ -56,9 +56,9 @@ def test_all_has_been_sent_when_the_block_ends_however_it_ends(error: type[Excep
     sent = Sent()
     sent.free.set()
     try:
-        with Outbox(sent.put) as outbox:
+        with SendQueue(sent.put) as queue:
             for number in range(3 * MOST):
-                outbox.give(number)
+                queue.put(number)
             if error:
                 raise error
     except RuntimeError:
@@ -73,20 +73,20 @@ def test_an_error_of_the_sending_reaches_who_gives_or_ends_next() -> None:
         tried.set()
         raise OSError("no connection")
 
-    def gives(outbox: Outbox[int], error: Exception | None = None) -> None:
-        with outbox:
-            outbox.give(1)
+    def puts(queue: SendQueue[int], error: Exception | None = None) -> None:
+        with queue:
+            queue.put(1)
             assert tried.wait(PATIENCE)
             if error:
                 raise error
 
-    outbox = Outbox(put)
+    queue = SendQueue(put)
     with pytest.raises(OSError, match="no connection"):
-        gives(outbox)
+        puts(queue)
     with pytest.raises(OSError, match="no connection"):
-        outbox.give(2)
+        queue.put(2)
     with pytest.raises(KeyError):
-        gives(Outbox(put), KeyError("the error of the block comes first"))
+        puts(SendQueue(put), KeyError("the error of the block comes first"))
 
 
 # ---- a batch on a worker -----------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Glimpses of running cases: the spheres as they lie now, small files that are written now and then."""
+"""Previews of running cases: their spheres at this moment, in small files that are written now and then."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ if TYPE_CHECKING:
     from dem_warp.batch import Batch
 
 EVERY = 1.0
-"""Least time between two glimpses of a process [s]."""
+"""Shortest time between two previews of a process [s]."""
 
 SHARE = 0.005
-"""Largest part of a run's time that glimpses take: a slow one is followed by a longer wait."""
+"""Largest part of a run's time that previews take: a slow one is followed by a longer wait."""
 
 WORLDS = 12
-"""Worlds of a batch that are looked at, at most."""
+"""Worlds of a batch that have previews, at most."""
 
 KEPT = 24
-"""Files that stay, at most; the oldest go first."""
+"""Files that are kept, at most; the oldest are removed first."""
 
 
 @dataclass
-class Glimpses:
-    """Takes glimpses of the worlds of a batch; for `dem_warp.simulate(on_advance=)`.
+class Previews:
+    """Takes previews of the worlds of a batch; for `dem_warp.simulate(on_advance=)`.
 
-    A file that cannot be written is left out: no run ends because nobody could watch it.
+    A file that cannot be written is left out, and the run continues.
     """
 
     folder: Path
     """Folder of the files; it is made when the first is written."""
     spent: float = field(default=0.0, repr=False)
-    """Time that glimpses have taken in this process [s]."""
+    """Time that previews have taken in this process [s]."""
     _due: float | None = field(default=None, repr=False)
 
     def __call__(self, batch: Batch) -> None:
-        """Take a glimpse of every world that is looked at, if it is time."""
+        """Take previews, if it is time."""
         if self._due is None:
             self._due = time.monotonic() + EVERY
         if time.monotonic() < self._due:
@@ -58,12 +58,12 @@ class Glimpses:
         worlds = batch.running[:: max(1, -(-len(batch.running) // WORLDS))]
         for world, view in zip(worlds, batch.solver.view(worlds), strict=True):
             facts = {"phase": batch.phase(world), "fraction": round(batch.fraction(world), 4)}
-            # those that still wait for their fall lie in each other
+            # grains that still wait for their fall overlap
             fallen = _only(batch.result(world), view.released[view.alive])
             self.write(batch.case_name(world), fallen, facts)
 
     def write(self, name: str, result: CaseResult, facts: dict[str, Any]) -> None:
-        """Write where the spheres of a case are, whole or not at all."""
+        """Write the spheres of a case, whole or not at all."""
         record = json.dumps(facts).encode()
         temporary = self.folder / f".{name}.{os.getpid()}"
         with contextlib.suppress(OSError):
@@ -71,43 +71,40 @@ class Glimpses:
             try:
                 with temporary.open("wb") as file:
                     np.savez(file, record=np.frombuffer(record, np.uint8), spheres=spheres_of(result))
-                # Not synchronised with the disk: a glimpse that is lost is no loss.
+                # not synchronised with the disk: a preview may be lost
                 temporary.replace(self.folder / f"{name}.npz")
             finally:
                 temporary.unlink(missing_ok=True)
 
     def _wait(self, cost: float) -> None:
-        """Stay away until what a glimpse took is a small part of the time."""
+        """Wait until the cost of a preview is a small part of the time."""
         self.spent += cost
         self._due = time.monotonic() + max(EVERY, cost / SHARE)
 
 
 def _only(result: CaseResult, grains: np.ndarray) -> CaseResult:
-    """Result of some of the grains."""
+    """Return the result of some of the grains."""
     names = ("positions", "orientations", "sizes", "shapes")
     return replace(result, **{name: getattr(result, name)[grains] for name in names})
 
 
 def spheres_of(result: CaseResult) -> np.ndarray:
-    """Rows of x, y, z, radius [m] and the number of the grain, float32: what a picture needs."""
+    """Return rows of x, y, z, radius [m] and the number of the grain, float32, for a picture."""
     columns = (result.sphere_centers, result.sphere_radii, result.sphere_grain)
     return np.column_stack(columns).astype("<f4")
 
 
-def read_glimpse(path: Path) -> tuple[np.ndarray, dict[str, Any]]:
-    """Read the spheres of a glimpse, see `spheres_of`, and its phase and fraction.
+def read_preview(path: Path) -> tuple[np.ndarray, dict[str, Any]]:
+    """Read the spheres of a preview, see `spheres_of`, and its phase and fraction.
 
-    Raises
-    ------
-    ValueError
-        When the file is none.
+    Raise ValueError when the file is not a preview.
     """
     arrays = read_arrays(path)
     try:
         spheres, facts = arrays["spheres"], json.loads(arrays["record"].tobytes())
         found = {"phase": str(facts["phase"]), "fraction": float(facts["fraction"])}
     except (LookupError, TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"must be a glimpse of a case: {error}") from None
+        raise ValueError(f"must be a preview of a case: {error}") from None
     if spheres.dtype != np.dtype("<f4") or spheres.ndim != 2 or spheres.shape[1] != 5:
         raise ValueError(f"must hold rows of five float32, got {spheres.dtype} {spheres.shape}")
     if not np.isfinite(spheres).all():
@@ -116,7 +113,7 @@ def read_glimpse(path: Path) -> tuple[np.ndarray, dict[str, Any]]:
 
 
 def prune(folder: Path, kept: int = KEPT) -> None:
-    """Remove all but the newest glimpses of a folder, and what a killed process left."""
+    """Remove all but the newest previews of a folder."""
     with contextlib.suppress(OSError):
         files = sorted(folder.glob("*.npz"), key=lambda path: path.stat().st_mtime, reverse=True)
         for path in files[kept:]:

@@ -1,8 +1,8 @@
-"""Keeper of a program: runs it, ends it at its time limit or with its starter, and notes how it ended.
+"""Run a program, end it at its time limit or with its starter, and note how it ended.
 
-A script of the standard library alone, run as ``python keeper.py LIMIT WORD...`` in the folder of a case. Its
-standard input is a pipe that nothing is written to: when the starter is gone, even killed, the pipe ends, and
-so does the program with all that it has started. So no program goes on unseen, and none is started twice.
+A script of the standard library alone, run as ``python run_program.py LIMIT WORD...`` in the folder of a
+case. Its standard input is a pipe that nothing is written to: when the starter has ended, even killed, the
+pipe ends, and so does the program with all that it started.
 """
 
 import contextlib
@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 ENDING, OUTPUT, ERRORS = "ending.json", "output.txt", "errors.txt"
-"""Files in the folder: how the program ended, and what it wrote to its two streams."""
+"""Files in the folder: the note of the program's end, and its two streams."""
 
 POSIX = os.name == "posix"
 
@@ -24,7 +24,7 @@ POSIX = os.name == "posix"
 def main(limit: str, *words: str) -> None:
     """Run a program of some words for at most ``limit`` seconds, ``inf`` for no limit."""
     started, seconds = time.monotonic(), float(limit)
-    # Several programs run at once: one thread each, unless the environment says otherwise.
+    # several programs run at once: one thread each, unless the environment says otherwise
     environment = {"OMP_NUM_THREADS": "1"} | os.environ
     with Path(OUTPUT).open("wb") as output, Path(ERRORS).open("wb") as errors:
         try:
@@ -49,13 +49,13 @@ def main(limit: str, *words: str) -> None:
 
 
 def _end_with_starter(program: "subprocess.Popen[bytes]") -> None:
-    os.read(0, 1)  # not by way of sys.stdin, whose lock would hold up this process's own end
+    os.read(0, 1)  # without sys.stdin, whose lock would delay this process's own end
     _end(program)
     os._exit(1)
 
 
 def _end(program: "subprocess.Popen[bytes]") -> None:
-    """End a program and whatever it has started and left."""
+    """End a program and all that it has started."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         if POSIX:
             os.killpg(program.pid, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""Glimpses of running cases: they change no bit, take hardly any time, and are read with care."""
+"""Previews of running cases: they change no bit, take hardly any time, and are read with care."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from dem_warp import CaseResult, simulate
-from experiments.journal import glimpses as module
-from experiments.journal.glimpses import KEPT, SHARE, Glimpses, prune, read_glimpse, spheres_of
+from experiments.journal import previews as module
+from experiments.journal.previews import KEPT, SHARE, Previews, prune, read_preview, spheres_of
 from experiments.studyfile import Study
 
 
@@ -23,12 +23,12 @@ def test_a_case_that_is_looked_at_ends_in_the_same_bits(
     monkeypatch.setattr(module, "EVERY", 0.0)
     monkeypatch.setattr(module, "SHARE", 1e9)
     seen: list[float] = []
-    looking = Glimpses(tmp_path)
+    looking = Previews(tmp_path)
 
     def look(batch) -> None:  # type: ignore[no-untyped-def]
         looking(batch)
         for path in tmp_path.glob("*.npz"):
-            spheres, facts = read_glimpse(path)
+            spheres, facts = read_preview(path)
             assert len(spheres) <= 30
             seen.append(facts["fraction"])
 
@@ -47,57 +47,57 @@ class Batch:
     running = (0,)
 
 
-def test_glimpses_take_a_small_part_of_the_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However slow the disk: on a clock of its own, a glimpse takes 0.3 s, and steps a millisecond."""
+def test_previews_take_a_small_part_of_the_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However slow the disk: on a clock of its own, a preview takes 0.3 s, and steps a millisecond."""
     now = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     monkeypatch.setattr(time, "perf_counter", lambda: now[0])
 
-    def slow(self: Glimpses, batch: object) -> None:
+    def slow(self: Previews, batch: object) -> None:
         now[0] += 0.3
 
-    monkeypatch.setattr(Glimpses, "_take", slow)
-    looking = Glimpses(tmp_path)
+    monkeypatch.setattr(Previews, "_take", slow)
+    looking = Previews(tmp_path)
     while now[0] < 1000.0:
         now[0] += 0.001
         looking(Batch())  # type: ignore[arg-type]
     assert 0.0 < looking.spent / now[0] <= SHARE + 0.3 / 1000.0
 
 
-def test_a_glimpse_holds_the_spheres_as_they_lie(cone: Callable[..., CaseResult], tmp_path: Path) -> None:
-    Glimpses(tmp_path).write("a", cone(), {"phase": "lift", "fraction": 0.25})
-    spheres, facts = read_glimpse(tmp_path / "a.npz")
+def test_a_preview_holds_the_spheres_as_they_lie(cone: Callable[..., CaseResult], tmp_path: Path) -> None:
+    Previews(tmp_path).write("a", cone(), {"phase": "lift", "fraction": 0.25})
+    spheres, facts = read_preview(tmp_path / "a.npz")
     assert np.array_equal(spheres, spheres_of(cone()))
     assert facts == {"phase": "lift", "fraction": 0.25}
     assert [path.name for path in tmp_path.iterdir()] == ["a.npz"]
 
 
 @pytest.mark.parametrize("content", [b"", b"PK", b"no archive"])
-def test_a_damaged_glimpse_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_a_damaged_preview_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.npz").write_bytes(content)
     with pytest.raises(ValueError, match="archive of arrays"):
-        read_glimpse(tmp_path / "a.npz")
+        read_preview(tmp_path / "a.npz")
 
 
 @pytest.mark.parametrize(
     ("arrays", "rule"),
     [
-        ({"spheres": np.zeros((2, 5), "<f4")}, "must be a glimpse"),
+        ({"spheres": np.zeros((2, 5), "<f4")}, "must be a preview"),
         ({"spheres": np.zeros((2, 4), "<f4"), "record": b'{"phase": "a", "fraction": 0}'}, "five float32"),
         ({"spheres": np.full((2, 5), np.nan, "<f4"), "record": b'{"phase": "a", "fraction": 0}'}, "finite"),
-        ({"spheres": np.zeros((2, 5), "<f4"), "record": b'{"phase": "a", "fraction": "x"}'}, "glimpse"),
+        ({"spheres": np.zeros((2, 5), "<f4"), "record": b'{"phase": "a", "fraction": "x"}'}, "preview"),
     ],
 )
-def test_a_glimpse_of_other_values_is_refused(tmp_path: Path, arrays: dict, rule: str) -> None:
+def test_a_preview_of_other_values_is_refused(tmp_path: Path, arrays: dict, rule: str) -> None:
     if "record" in arrays:
         arrays = arrays | {"record": np.frombuffer(arrays["record"], np.uint8)}
     np.savez(tmp_path / "a.npz", **arrays)
     with pytest.raises(ValueError, match=rule):
-        read_glimpse(tmp_path / "a.npz")
+        read_preview(tmp_path / "a.npz")
 
 
-def test_few_glimpses_stay(cone: Callable[..., CaseResult], tmp_path: Path) -> None:
+def test_few_previews_stay(cone: Callable[..., CaseResult], tmp_path: Path) -> None:
     for number in range(KEPT + 5):
-        Glimpses(tmp_path).write(f"{number}", cone(), {"phase": "lift", "fraction": 0.5})
+        Previews(tmp_path).write(f"{number}", cone(), {"phase": "lift", "fraction": 0.5})
     prune(tmp_path)
     assert len(list(tmp_path.iterdir())) == KEPT

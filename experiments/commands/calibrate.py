@@ -1,0 +1,48 @@
+"""``dem-warp calibrate``: a whole calibration."""
+
+from __future__ import annotations
+
+import json
+
+import typer
+
+from experiments.commands.console import FAILED_RUN, Attempt, clear_errors, messages
+from experiments.commands.options import AsJson, DryRun, Live, StudyFile, options_of, with_request
+from experiments.commands.plans import show_plan
+from experiments.commands.results import print_study, show_stage
+from experiments.live.server import live_page
+from experiments.runs.request import RunRequest
+
+CALIBRATE_EXAMPLE = "Example: [bold]dem-warp calibrate mygrain.toml --out out/mygrain[/]"
+
+
+@with_request()
+def calibrate(
+    study: StudyFile = None,
+    dry_run: DryRun = False,
+    live: Live = False,
+    as_json: AsJson = False,
+    *,
+    asked: RunRequest,
+) -> None:
+    """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
+    with clear_errors():
+        from experiments.runs.choices import check_campaign, prepare
+
+        prepared = prepare(study, asked, check_campaign)
+        if dry_run:
+            from experiments.runs.plan import plan_calibration
+
+            show_plan(plan_calibration(prepared), as_json)
+    advice = Attempt.of("calibrate", study, **options_of(prepared), live=live, json=as_json)
+    with clear_errors(advice), live_page(prepared.folder, live, messages.print):
+        from experiments.runs.calibration import run_calibration
+
+        print_study(prepared.study, prepared.resources)
+        ended = run_calibration(prepared, show_stage)
+    if as_json:
+        typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
+    messages.print(f"{ended.campaign.outcome}: {ended.campaign.reason}")
+    messages.print(f"Report: {ended.report}")
+    if ended.failed:
+        raise typer.Exit(FAILED_RUN)

@@ -1,0 +1,56 @@
+"""An engine for tests: cones whose angle follows the friction; it notes the seeds that it simulates."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dem_warp import Case, CaseResult
+
+SEEDS = "DEM_WARP_TEST_SEEDS"
+"""Variable of the environment that names the file of the simulated seeds."""
+
+RADIUS, BASE = 1e-3, 20e-3
+
+
+def cone_engine(
+    cases: Sequence[Case],
+    device: str | None = None,
+    workers: int | None = None,
+    on_result: Any = None,
+    on_progress: Any = None,
+    checkpoint: Any = None,
+) -> list[CaseResult]:
+    """Answer each case with a cone of 15 degrees, and 30 more for a friction of 1."""
+    results = []
+    for index, case in enumerate(cases):
+        with Path(os.environ[SEEDS]).open("a", encoding="utf-8") as file:
+            file.write(f"{case.seed}\n")
+        angle = 15.0 + 30.0 * case.grain_grain.static_friction + 0.3 * math.sin(12.9898 * case.seed)
+        results.append(cone_of(angle))
+        on_result(index, results[-1])
+    return results
+
+
+def cone_of(angle: float) -> CaseResult:
+    """Build the result of a case that ended in a cone of spheres."""
+    grid = np.arange(-BASE, BASE, RADIUS)
+    x, y = (axis.ravel() for axis in np.meshgrid(grid, grid))
+    z = math.tan(math.radians(angle)) * (BASE - np.hypot(x, y))
+    places = np.column_stack([x, y, z])[z > 0.0]
+    return CaseResult(
+        status="finished",
+        reason="",
+        positions=places,
+        orientations=np.tile([0.0, 0.0, 0.0, 1.0], (len(places), 1)),
+        sizes=np.ones(len(places)),
+        shapes=np.zeros(len(places), dtype=int),
+        clumps=np.array([[[0.0, 0.0, 0.0, RADIUS]]]),
+        observables={"grain_count": float(len(places)), "time_to_rest": 0.5, "truth": angle},
+        provenance={"device": "CPU"},
+    )

@@ -1,0 +1,201 @@
+"""Each command killed at ten points, started twice in one folder, and resumed to the same results."""
+
+from __future__ import annotations
+
+import json
+import os
+import traceback
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from commandline import dem_warp
+from cone_engine import SEEDS, cone_engine
+
+from experiments.cases import execute
+from experiments.cases.engines import engines
+from experiments.cases.store.outcome_table import OutcomeTable
+from experiments.discover import engine_simulator
+from experiments.measurement.case_observables import Observed
+from experiments.report.material_card import write_material_card
+from experiments.runs import calibration
+
+KILLS = 10
+KILLED = 99
+"""Exit code of a process that was killed."""
+
+
+class Direct(Executor):
+    """Measures at once, in this process."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **_: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(function(*arguments))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        pass
+
+
+@dataclass
+class Command:
+    """A command and what must be the same however often it was killed."""
+
+    words: tuple[object, ...]
+    results: str
+    """File of its results."""
+    folder: Path
+    whole: Path = field(init=False)
+    writes: int = field(init=False)
+    """Files that an uninterrupted run puts in place, and rows that it saves."""
+
+    def __post_init__(self) -> None:
+        self.whole = self.folder / "whole"
+        code, self.writes = self.run(self.whole)
+        assert code == 0, (self.folder / "trace.txt").read_text()
+
+    def run(self, out: Path, *more: str, kill_at: int | None = None) -> tuple[int, int]:
+        """Run it in a process of its own; return its exit code, and how much it has written."""
+        count = self.folder / "count.txt"
+        if (child := os.fork()) == 0:
+            code = 70
+            try:
+                with writes_counted(count, kill_at):
+                    code, _, said = dem_warp(*self.words, "--out", out, *more)
+                    (self.folder / "trace.txt").write_text(said)
+            except BaseException:
+                (self.folder / "trace.txt").write_text(traceback.format_exc())
+            finally:
+                os._exit(code)
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        return status, int(count.read_text())
+
+    def found(self, out: Path) -> Any:
+        """Read its results."""
+        path = out / self.results
+        if path.suffix == ".npz":
+            with np.load(path) as arrays:
+                return {name: arrays[name].tobytes() for name in arrays}
+        return json.loads(path.read_text(encoding="utf-8"))
+
+
+class writes_counted:  # noqa: N801
+    """Count what is put in place or saved, and end the process at once before the last that is allowed."""
+
+    def __init__(self, count: Path, kill_at: int | None) -> None:
+        self.count, self.kill_at, self.number = count, kill_at, 0
+
+    def __enter__(self) -> None:
+        self.replace, self.save = os.replace, OutcomeTable.save
+        os.replace = self.counted(self.replace)  # type: ignore[assignment]
+        OutcomeTable.save = self.counted(self.save)  # type: ignore[method-assign]
+
+    def __exit__(self, *error: object) -> None:
+        self.count.write_text(str(self.number))
+
+    def counted(self, write: Callable[..., Any]) -> Callable[..., Any]:
+        def counting(*arguments: Any, **rest: Any) -> Any:
+            # how often the progress is noted depends on the clock
+            if Path(str(arguments[1])).name != "progress.json":
+                self.number += 1
+                if self.number == self.kill_at:
+                    self.count.write_text(str(self.number))
+                    os._exit(KILLED)
+            return write(*arguments, **rest)
+
+        return counting
+
+
+@pytest.fixture(scope="module")
+def _stand_ins(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Simulate and measure in no time, and write the results without a page."""
+
+    def write_results(campaign: Any, study: Any, folder: Path, *_: Any, **__: Any) -> None:
+        (folder / "results.json").write_text(json.dumps(campaign.to_dict()), encoding="utf-8")
+        write_material_card(campaign, study, folder)
+
+    def observe(_: Any, result: Any, __: Any) -> Observed:
+        return Observed({"angle": result.observables["truth"]}, SimpleNamespace(se=0.1))
+
+    def measure(_: Any, result: Any, names: tuple[str, ...]) -> tuple[np.ndarray, str]:
+        return result.observables["truth"] + np.arange(len(names)), ""
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(engines._DRIVERS, "cones", cone_engine)
+        patch.setattr(execute, "observe", observe)
+        patch.setattr(execute, "SAVE_EVERY", 0.0)
+        patch.setattr(execute, "measuring_processes", lambda *_: Direct())
+        patch.setattr(engine_simulator, "measure", measure)
+        patch.setattr(calibration, "write_report", write_results)
+        patch.setattr(calibration, "heap_pictures", lambda *_: [])
+        patch.setattr(calibration, "verified_heap", lambda *_: None)
+        patch.setenv(SEEDS, str(tmp_path_factory.mktemp("seeds") / "seeds.txt"))
+        yield
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> Path:
+    path = tmp_path_factory.mktemp("study") / "small.toml"
+    path.write_text(f"{small_text}\n[campaign.noise_floor]\nreplicates = 5\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def _calibrate(_stand_ins: None, study: Path, tmp_path_factory: pytest.TempPathFactory) -> Command:
+    words = ("calibrate", study, "--engine", "cones", "--device", "cpu")
+    return Command(words, "results.json", tmp_path_factory.mktemp("calibrate"))
+
+
+@pytest.fixture(scope="module", params=["calibrate", "discover", "bridge", "heap"])
+def command(
+    request: pytest.FixtureRequest, _calibrate: Command, study: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Command:
+    if request.param == "calibrate":
+        return _calibrate
+    cones = ("--engine", "cones")
+    words, results = {
+        "discover": (("discover", study, *cones, "--device", "cpu"), "bank.npz"),
+        "bridge": (("bridge", _calibrate.whole / "material.toml", *cones, "--workers", 1), "bridge.json"),
+        "heap": (("heap", study, *cones, "--device", "cpu"), "angle.json"),
+    }[request.param]
+    return Command(words, results, tmp_path_factory.mktemp(request.param))
+
+
+def simulated() -> list[str]:
+    return Path(os.environ[SEEDS]).read_text(encoding="utf-8").split()
+
+
+def test_a_run_killed_at_ten_points_is_resumed_to_the_same_results(command: Command, tmp_path: Path) -> None:
+    cases = len(list((command.whole / "cases").glob("*.npz")))
+    for number in range(KILLS):
+        out = tmp_path / str(number)
+        before = len(simulated())
+        kill_at = 1 + round(number * (command.writes - 1) / (KILLS - 1))
+        assert command.run(out, kill_at=kill_at)[0] == KILLED
+        resume = ("--resume",) if (out / "study.json").is_file() else ()
+        assert command.run(out, *resume)[0] == 0, (command.folder / "trace.txt").read_text()
+        assert command.found(out) == command.found(command.whole)
+        if cases:  # the case that was being saved is simulated again
+            assert cases <= len(simulated()) - before <= cases + 1
+
+
+def test_a_second_run_in_the_folder_is_refused(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused = []
+
+    def begin_twice(*arguments: Any, **rest: Any) -> Any:
+        if not refused:
+            for more in ((), ("--resume",)):
+                code, _, said = dem_warp(*command.words, "--out", tmp_path / "out", *more)
+                refused.append((code, "another run is using this folder" in said))
+        return cone_engine(*arguments, **rest)
+
+    monkeypatch.setitem(engines._DRIVERS, "cones", begin_twice)
+    assert dem_warp(*command.words, "--out", tmp_path / "out")[0] == 0
+    assert refused == [(2, True)] * 2
