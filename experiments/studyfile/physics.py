@@ -33,7 +33,6 @@ MOST_GRAINS = 20_000_000
 """Grains of a case: more fill a GPU of 140 GB."""
 
 
-
 class GrainCountError(ValueError):
     """More grains than a case can have: the problem, and their number."""
 

@@ -314,7 +314,7 @@ def test_one_and_three_kept_factors(names: tuple[str, ...]) -> None:
     assert set(unidentified) == (set() if len(names) == 1 else set(names))
 
 
-@pytest.mark.parametrize("stage", ["target", "noise_floor", "screening", "climb", "surface", "verification"])
+@pytest.mark.parametrize("stage", ["target", "screening", "climb", "verification"])
 def test_a_stage_whose_cases_all_fail_ends_the_campaign(stage: str) -> None:
     heaps = AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == stage)
     campaign = calibrate(AnalyticStudy(target=hidden(E=0.5, F=0.42)), heaps)

@@ -212,15 +212,6 @@ def test_clogged_bins_cost_their_own_response_only() -> None:
     assert len(campaign.failed_cases) == 2
 
 
-@pytest.mark.parametrize("stage", ["target", "noise_floor", "screening", "surface", "verification"])
-def test_a_response_whose_cases_all_fail_ends_the_campaign(stage: str) -> None:
-    fails = Cases(lambda row: row["scene"] == "bin" and row["stage"] == stage)
-    campaign = calibrate(twin(DENSITY, LEFT), fails)
-    assert campaign.outcome is Outcome.TOO_MANY_FAILED_RUNS
-    assert stage not in campaign.stages
-    assert "for left" in campaign.reason
-
-
 def test_results_and_tables_hold_every_response() -> None:
     campaign = calibrate(twin(DENSITY, LEFT), Cases())
     found = json.loads(json.dumps(campaign.to_dict(), allow_nan=False))

@@ -183,12 +183,6 @@ def test_everything_that_determines_an_outcome_is_in_its_key(
     assert len(keys) == len(points) + 1
 
 
-def test_no_points_are_no_outcomes(study: Study, table: OutcomeTable) -> None:
-    outcomes = build(study, table)([])
-    assert outcomes.values.shape == (0, len(NAMES))
-    assert outcomes.reasons == ()
-
-
 def test_a_table_gives_back_what_was_saved(table: OutcomeTable) -> None:
     # More than one query asks for.
     rows = {f"{i}": (np.array([i, np.nan]), "clogged" if i % 2 else "") for i in range(1200)}

@@ -98,8 +98,8 @@ HOSTILE = {
     "no grain's size": study("heap", '"2 mm"', '"0 mm"', "grain.sphere", "greater than 0", "0 mm"),
     "no clump": study("heap", 'sphere = "2 mm"', 'clump = "c.txt"', "grain.clump", "no such clump", "c.txt"),
     "clump and sphere": study("heap", "[grain]", '[grain]\nclump = "s.toml"', "grain", "not both"),
-    "nine megabytes": study(
-        "heap", 'name = "Small"', f'nome = "{"x" * 9_000_000}"', "nome", "unknown key"
+    "two megabytes": study(
+        "heap", 'name = "Small"', f'nome = "{"x" * 2_000_000}"', "nome", "unknown key"
     ),
     "half a scene": study(
         "heap", "[numerics]", "[scene.drum]\n[numerics]", "scene.drum.length", "is required"
