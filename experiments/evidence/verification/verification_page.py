@@ -29,8 +29,9 @@ STYLES = {"points": "o", "dashed": "--", "line": "-"}
 INTRODUCTION = """# Verification
 
 Written by `python -m experiments.evidence.verification`; the same rows are in `rows.csv`, and the data of
-every plot is in a file of its name. Every chapter says what it ran on. An error is relative (in %) or in the unit
-of the quantity. A row passes when its error is within its tolerance; a row that is only *stated* has none.
+every plot is in a file of its name. Every chapter says what it ran on. An error is relative (in %) or in the
+unit of the quantity. A row passes when its error is within its tolerance; a row that is only *stated* has
+none.
 "Production precision" has poses in float64 and forces in float32.
 """
 

@@ -6,7 +6,6 @@ import json
 import stat
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +17,7 @@ from typer.testing import CliRunner
 from experiments.evidence.performance import heap_throughput
 from experiments.evidence.performance.columns import Columns, Moment
 from experiments.evidence.performance.peers import lammps_peer, liggghts_peer, yade_peer
-from experiments.evidence.performance.peers.lammps_files import timed_runs
 from experiments.evidence.performance.peers.peer import PeerRun, Plan
-from experiments.evidence.performance.peers.peer_comparison import SPEED, compare
 from experiments.evidence.performance.peers.peer_list import PEERS, PeerName
 from experiments.evidence.performance.roofline import world_contacts
 from experiments.evidence.performance.timing import start
@@ -154,27 +151,6 @@ def test_a_peer_gets_the_column_and_its_answer_is_read(
         assert done.timings[skin].free_spheres == 9 * column.setup.grains.count
 
 
-def test_the_table_has_both_codes(small_columns: Columns, install: Install, tmp_path: Path) -> None:
-    install(
-        PeerName.YADE,
-        FAKES[PeerName.YADE]
-        .replace("[[0.8, 0.9], [1.0, 1.1]]", "4 * [[0.8, 0.9]]")
-        .replace("[7, 11]", "4 * [7]"),
-    )
-    name, text, table = compare(PeerName.YADE, small_columns, 64, tmp_path)
-    assert name == "yade"
-    assert list(table["code"]) == 5 * ["dem-warp"] + 4 * ["Yade 2030.01"]
-    ours, theirs = table[table["code"] == "dem-warp"], table[table["code"] != "dem-warp"]
-    assert f"{ours[SPEED].max() / theirs[SPEED].max():.2f} times as fast" in text
-    assert "kinetic energy" in text
-
-
-def test_runs_are_timed_skin_by_skin() -> None:
-    assert timed_runs(PLAN).split("\n")[:-1] == [
-        "neighbor 0.0001 bin", "run 300", "run 300", "neighbor 0.0002 bin", "run 300", "run 300",
-    ]  # fmt: skip
-
-
 # ---- what each is told -------------------------------------------------------------------------------------
 
 
@@ -197,23 +173,6 @@ def leaves(_: float, state: np.ndarray) -> float:
 
 leaves.terminal = True  # type: ignore[attr-defined]
 leaves.direction = -1.0  # type: ignore[attr-defined]
-
-
-def test_liggghts_gets_the_materials_of_the_case(
-    small_columns: Columns, column: Moment, tmp_path: Path
-) -> None:
-    liggghts_peer.write_input(tmp_path, small_columns.cases[0], column, PLAN)
-    text = (tmp_path / "column.in").read_text()
-    found = {
-        name: [float(word) for word in text.split(f"global {name} ")[1].splitlines()[0].split()[1:]]
-        for name in ("youngsModulus", "poissonsRatio", "coefficientRestitution", "coefficientFriction")
-    }
-    assert found["youngsModulus"] == pytest.approx([MODULUS, 2.0 * 70e9 * 1.3])
-    assert found["poissonsRatio"] == [0.29, 0.30]
-    assert found["coefficientRestitution"] == [2, 0.18, 0.5, 0.5, 0.5]
-    assert found["coefficientFriction"] == [2, 0.46, 0.38, 0.38, 0.38]
-    mass = float(text.split(" mass ")[1].split()[0])
-    assert mass == pytest.approx(698.0 * column.setup.shapes[0].volume)
 
 
 def test_lammps_gets_the_case_in_its_own_terms(
@@ -244,23 +203,6 @@ def test_lammps_gets_the_case_in_its_own_terms(
         assert rebound(lambda x, c=coefficient: c * x**0.25) == pytest.approx(restitution, abs=2e-3)
         # both dampings are one part of the critical one, of a spring 8 G* a and of one 2 E* a
         assert tangential == pytest.approx(np.sqrt(spring / modulus), rel=1e-12)
-
-
-def test_lammps_gets_the_bodies(small_columns: Columns, column: Moment, tmp_path: Path) -> None:
-    lammps_peer.write_input(tmp_path, small_columns.cases[0], column, PLAN)
-    count, *lines = (tmp_path / "bodies.txt").read_text().splitlines()
-    grains, shape = column.setup.grains, column.setup.shapes[0]
-    bodies = np.array([line.split() for line in lines], dtype=float)
-    assert int(count) == len(bodies) == grains.count
-    assert bodies.shape[1] == 20
-    mass = 698.0 * shape.volume
-    np.testing.assert_allclose(bodies[:, 1], mass, rtol=1e-6)
-    np.testing.assert_allclose(bodies[:, 2:5], grains.positions, rtol=1e-14)
-    xx, yy, zz, xy, xz, yz = bodies[:, 5:11].T
-    tensors = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
-    # turned, a body keeps its principal moments
-    principal = np.tile(np.sort(mass * shape.inertia_over_mass), (grains.count, 1))
-    np.testing.assert_allclose(np.linalg.eigvalsh(tensors), principal, rtol=1e-6)
 
 
 def test_yade_gets_the_case_in_its_own_terms(small_columns: Columns, column: Moment, tmp_path: Path) -> None:
@@ -308,16 +250,6 @@ def test_yade_s_tube_touches_the_cylinder_from_outside(
 # ---- what cannot run ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("write", [liggghts_peer.write_input, yade_peer.write_input])
-def test_grains_of_several_sizes_are_refused(
-    small_columns: Columns, column: Moment, tmp_path: Path, write: Callable[..., None]
-) -> None:
-    grains = replace(column.setup.grains, sizes=np.linspace(0.9, 1.0, column.setup.grains.count))
-    mixed = replace(column, setup=replace(column.setup, grains=grains))
-    with pytest.raises(ValueError, match=r"peer: grains must be of one size, got 0\.9 to 1"):
-        write(tmp_path, small_columns.cases[0], mixed, PLAN)
-
-
 @pytest.mark.parametrize("name", PeerName)
 def test_a_peer_that_is_not_there_is_an_error_before_anything_runs(
     name: PeerName, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -329,12 +261,3 @@ def test_a_peer_that_is_not_there_is_an_error_before_anything_runs(
     assert result.exit_code == 2
     assert f"{PEERS[name].program} must be installed" in " ".join(result.output.split())
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("name", PeerName)
-def test_a_peer_that_fails_says_so(
-    small_columns: Columns, column: Moment, install: Install, tmp_path: Path, name: PeerName
-) -> None:
-    install(name, "#!{python}\nopen('column.log', 'w').write('ERROR: lost')\nraise SystemExit(3)\n")
-    with pytest.raises(RuntimeError, match=r"failed in .*: (ERROR: lost|3)"):
-        PEERS[name].run(tmp_path / "run", small_columns.cases[0], column, PLAN)

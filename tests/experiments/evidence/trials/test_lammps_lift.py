@@ -114,19 +114,6 @@ def test_the_damping_is_ours_and_the_sums_of_rains_are_the_grains() -> None:
             assert sum(float(share) for share in shares.split()) == pytest.approx(1.0, abs=1e-12)
 
 
-def test_grains_are_taken_off_before_they_leave_the_box_in_parts() -> None:
-    case = case_of()
-    text = lammps_text(case)
-    box = [float(x) for x in re.findall(r"region box block (.*)\n", text)[0].split()]
-    far = re.findall(r"region far block (\S+) (\S+) \S+ \S+ INF (\S+) side out", text)[0]
-    looked = case.scene.look_time * 2.0  # a grain at 2 m/s, from one look to the next
-    # a grain on the edge reaches as far out as it is long
-    for edge, end in zip(far, (box[0], box[1], box[5]), strict=True):
-        assert abs(end) - abs(float(edge)) > 2.0 * case.grains.grain_reach + looked
-    # a clogged tube is known by what has risen by more than its height
-    assert float(far[2]) > 1.5 * case.scene.height
-
-
 def test_a_tube_that_trembles_is_lifted_and_a_heap_that_does_is_none() -> None:
     text = lammps_text(case_of())
 

@@ -22,7 +22,7 @@ from experiments.cases.engines.program import AnswerError
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.evidence.trials.generate_trials import STUDY
 from experiments.evidence.trials.other_codes.code_effects import DECLARED, STRANGERS
-from experiments.evidence.trials.other_codes.code_process import CODES, engine_for
+from experiments.evidence.trials.other_codes.code_process import engine_for
 from experiments.evidence.trials.other_codes.code_simulator import OtherCodeSimulator
 from experiments.evidence.trials.other_codes.code_surfaces import Bench
 from experiments.evidence.trials.other_codes.dump_reading import (
@@ -32,7 +32,7 @@ from experiments.evidence.trials.other_codes.dump_reading import (
     read_balance,
     read_film,
 )
-from experiments.evidence.trials.other_codes.generate_other import PLAN, in_turn, plan_for, write_reality
+from experiments.evidence.trials.other_codes.generate_other import PLAN, in_turn, plan_for
 from experiments.evidence.trials.other_codes.liggghts_trials import energy_density, liggghts_files, wetting
 from experiments.evidence.trials.other_codes.making import MADE
 from experiments.evidence.trials.other_codes.setting import Setting
@@ -115,14 +115,6 @@ def test_spheres_that_are_no_grain_are_refused() -> None:
         Grasp(SHAPE).frame(0, rows[:2])
 
 
-def test_spheres_of_a_grain_that_has_left_are_passed_over() -> None:
-    rows = rows_of(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), np.ones(2), 2, np.zeros(3))
-    gone = np.flatnonzero(rows[:, 1] == 2)
-    rows[gone, 1] = -1
-    frame = Grasp(SHAPE).frame(5, np.delete(rows, gone[0], axis=0))
-    assert frame.positions == pytest.approx(np.zeros((1, 3)), abs=1e-12)
-
-
 def test_a_film_that_breaks_off_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "film.dump"
     with pytest.raises(AnswerError, match=r"wrote no film\.dump"):
@@ -178,19 +170,6 @@ def test_times_and_drag_of_a_drawn_film_are_those_it_was_drawn_with() -> None:
     assert len(last.numbers) == 60
 
 
-def test_a_film_without_an_end_and_a_look_without_its_force_are_refused() -> None:
-    case = case_of()
-    places = np.column_stack([np.zeros((5, 2)), np.linspace(0.002, 0.02, 5)])
-    frames = list(_film(case, places))
-    forces = {frame.step: 0.0 for frame in frames}
-    with pytest.raises(AnswerError, match="ends before the tube is clear"):
-        filmed_observables(case, iter(frames[:20]), forces)
-    with pytest.raises(AnswerError, match=f"step {LOOK}: the balance has no force"):
-        filmed_observables(case, iter(frames), {})
-    with pytest.raises(AnswerError, match="no frame"):
-        filmed_observables(case, iter([]), {})
-
-
 # ---- effects -----------------------------------------------------------------------------------------------
 
 
@@ -228,14 +207,6 @@ def test_each_stranger_changes_the_case_and_keeps_the_mean_mass() -> None:
             sum(t.fraction * t.mass for t in whole), rel=1e-6
         )
     assert [each.name for each in DECLARED] == list(STRANGERS)
-
-
-def test_the_plate_of_known_friction_is_not_made_slick() -> None:
-    case = case_of()
-    known = replace(case, scene=replace(case.scene, plate_friction=0.8))
-    assert STRANGERS["slick_plate"].change(known, 0.9) == known
-    slick = STRANGERS["slick_plate"].change(case, 0.9)
-    assert slick.scene.plate_friction == pytest.approx(0.1 * case.grain_wall.static_friction)
 
 
 def liggghts_text(case: Case) -> str:
@@ -318,13 +289,6 @@ def test_trials_are_measured_evenly_over_their_classes() -> None:
         even = seen[-1] * (np.arange(len(order)) + 1) / len(order)
         # each class is half a trial off its share at most, and no kind here has more than two
         assert np.abs(seen - even).max() < 2.0
-
-
-@pytest.mark.parametrize("code", CODES)
-def test_the_reality_says_how_each_effect_is_made(code: str, tmp_path: Path) -> None:
-    write_reality(tmp_path / "reality.json", code)
-    text = (tmp_path / "reality.json").read_text()
-    assert all(name in text for name in (*MADE[code], *STRANGERS))
 
 
 # ---- the codes themselves ----------------------------------------------------------------------------------

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import synthetic_world as synthetic
 
-from doe.discrepancy import Settings
-from experiments.evidence.trials.declaration import declared_effects
 from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS, VIEWS
 from experiments.evidence.trials.trial_camera import Camera
 from experiments.studyfile.observables import BY_NAME, NAMES, OUTLINE, PHOTOGRAPHED
@@ -58,12 +55,3 @@ def test_photographs_show_every_height_of_the_outline_and_nothing_of_a_balance()
     # what a balance, a film and a ruler show stays in the other views
     assert VIEWS[EVERYTHING] == NAMES
     assert set(VIEWS[OUTLINED]) == {*NAMES, *shown}
-
-
-def test_what_is_seen_less_of_is_declared_from_a_larger_size_on() -> None:
-    known, settings = synthetic.emulator(), Settings(draws=500)
-    whole = declared_effects(known, settings, 8)
-    pictures = declared_effects(known, settings, 8, VIEWS[PHOTOGRAPHS])
-    assert any(one.resolvable for one in pictures)
-    for less, more in zip(pictures, whole, strict=True):
-        assert less.detectable >= more.detectable

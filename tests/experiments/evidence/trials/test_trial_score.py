@@ -8,12 +8,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from doe.discrepancy import Settings, Verdict
+from doe.discrepancy import Verdict
 from experiments.evidence.trials import trials_page
-from experiments.evidence.trials.declaration import Declaration
 from experiments.evidence.trials.findings import (
     EVERYTHING,
-    PHOTOGRAPHS,
     Finding,
     findings_table,
     read_findings,
@@ -34,8 +32,7 @@ from experiments.evidence.trials.score import (
 )
 from experiments.evidence.trials.trials_folder import Folder
 from experiments.evidence.trials.trials_page import write_trials_page
-from experiments.evidence.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
-from experiments.evidence.trials.truths import Declared, Plan
+from experiments.evidence.trials.truth import Kind, Label, Sealed, write_sealed
 from experiments.io.errors import InputError
 
 RECORDS = Path(trials_page.__file__).with_name("record")
@@ -150,42 +147,6 @@ def test_an_analysis_that_is_wrong_fails_the_aims_that_it_misses(
     worded = {q.replace("two mechanisms: no wrong name", "two mechanisms: a wrong name") for q in shared}
     missed = {aim.question for aim in foreign_aims(table) if aim.passed is False}
     assert missed == worded | wrong
-
-
-def test_without_trials_nothing_passes() -> None:
-    table = scored(findings_table([]), {}, [])
-    assert [aim.question for aim in (*aims(table, []), *foreign_aims(table)) if aim.passed] == []
-
-
-def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
-    findings, labels = ideal_trials()
-    labels = {name: Label(**{**vars(label), "trial": name}) for name, label in labels.items()}
-    library = tuple(Declared(name, 0.0, 10.0, 1.0) for name in "abcdefgh")
-    declaration = Declaration("Grain", "", "2026-01-01", Plan(), Settings(), library, ())
-    declaration.write(tmp_path / "declared.json")
-    write_sealed(
-        tmp_path / "sealed.csv", [Sealed(name, "all", (), label.hash) for name, label in labels.items()]
-    )
-    write_labels(tmp_path / "labels.json", list(labels.values()))
-    # Photographs show the same, and no aim was set for them.
-    both = findings_table([Finding(**row) for view in (EVERYTHING, PHOTOGRAPHS)
-                           for row in findings.assign(view=view).to_dict("records")])  # fmt: skip
-    write_findings(tmp_path / "findings.csv", both)
-    (tmp_path / "notes.md").write_text("Said beside.\n")
-    (tmp_path / "runs.csv").write_text(
-        "what,machine,warp,date,cases,seconds\nheaps,GPU,1.19,2026-01-01,40,3.5\n"
-    )
-    text = write_trials_page(tmp_path).read_text(encoding="utf-8")
-    assert text.count("| pass |") == len(aims(scored(findings, labels, []), []))
-    # The mechanisms of this library are not those that must be resolvable.
-    assert text.count("FAIL") == 1
-    assert "Said beside." in text
-    assert {path.name for path in tmp_path.glob("*.png")} == {
-        "confusion-everything.png",
-        "power-everything.png",
-        "confusion-photographs.png",
-        "power-photographs.png",
-    }
 
 
 def test_a_strong_trial_ends_in_one_way() -> None:

@@ -43,7 +43,6 @@ from experiments.evidence.trials.declaration import (
     with_names,
 )
 from experiments.evidence.trials.findings import EVERYTHING, PHOTOGRAPHS, Crash, read_findings
-from experiments.evidence.trials.run_trials import chosen
 from experiments.evidence.trials.trial_heaps import cases_of
 from experiments.evidence.trials.trials_folder import Folder
 from experiments.evidence.trials.truth import (
@@ -56,7 +55,7 @@ from experiments.evidence.trials.truth import (
     write_labels,
     write_sealed,
 )
-from experiments.evidence.trials.truths import STRONG, Declared, Plan, draw
+from experiments.evidence.trials.truths import Declared, Plan, draw
 from experiments.io.errors import InputError
 
 FACTORS = (Factor("mu", 0.2, 0.6), Factor("e", 0.1, 0.5))
@@ -106,13 +105,6 @@ def test_truths_lie_in_their_ranges() -> None:
             assert low <= size <= high
 
 
-def test_strength_is_the_distance_from_the_null() -> None:
-    strengths = [label for label, _ in draw_trials() if label.mechanisms == ("spread",)]
-    for label in strengths:
-        assert label.multiples[0] == pytest.approx((label.sizes[0][1] - 0.05) / 0.05)
-    assert sum(label.multiples[0] > STRONG for label in strengths) == 2 + 2
-
-
 def test_a_withheld_mechanism_goes_with_its_like_and_pairs_are_never_alike() -> None:
     for label, sealed in draw_trials():
         if label.kind is Kind.WITHHELD:
@@ -130,15 +122,6 @@ def test_the_name_of_a_trial_says_nothing_of_its_kind() -> None:
     assert abs(sum(first) - 200 * 3 / 19) < 21
 
 
-def test_a_share_of_the_trials_is_that_share_of_every_part() -> None:
-    sealed = [trial for _, trial in draw_trials()]
-    halves = [trial.part for trial in chosen(sealed, every=2)]
-    for part in {trial.part for trial in sealed}:
-        assert halves.count(part) == sum(trial.part == part for trial in sealed) // 2
-        assert {trial.part for trial in chosen(sealed, part)} == {part}
-    assert chosen(sealed) == sealed
-
-
 def test_labels_are_held_to_their_seals(tmp_path: Path) -> None:
     labels, sealed = zip(*draw_trials(), strict=True)
     write_labels(tmp_path / "labels.json", labels)
@@ -151,11 +134,6 @@ def test_labels_are_held_to_their_seals(tmp_path: Path) -> None:
         revealed(bent, sealed)
     with pytest.raises(InputError, match="the sealed trial has no label"):
         revealed(labels[1:], sealed)
-
-
-def test_a_seal_depends_on_its_salt() -> None:
-    label = draw_trials()[0][0]
-    assert replace(label, salt="other").hash != label.hash
 
 
 def test_pairs_need_partners() -> None:

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from experiments.evidence.record_page import markdown_table
 from experiments.evidence.trials.baselines import benchmark_files, record_methods, run_methods
 from experiments.evidence.trials.baselines.answers_table import add_answer, file_of, read_answers
 from experiments.evidence.trials.baselines.benchmark_files import (
@@ -20,11 +19,9 @@ from experiments.evidence.trials.baselines.benchmark_files import (
     write_benchmark,
 )
 from experiments.evidence.trials.baselines.draw import round_of
-from experiments.evidence.trials.baselines.method_list import ALONE, methods
+from experiments.evidence.trials.baselines.method_list import ALONE
 from experiments.evidence.trials.baselines.method_tables import (
     Paired,
-    Parts,
-    areas,
     comparisons,
     due,
     held,
@@ -60,15 +57,6 @@ def test_the_release_is_small_and_every_trial_has_its_answer_apart(released: Ben
         assert (hidden <= set(trial.withheld)) == (label.kind in (Kind.NULL, Kind.WITHHELD))
         shape = 8, len(trial.measured.observables)
         assert {trial.measured.values[name].shape for name in trial.measured.conditions} == {shape}  # noqa: PD011
-
-
-def test_any_first_part_of_the_trials_is_balanced(released: Benchmark) -> None:
-    labels = load_answers()
-    kinds = pd.Series([str(labels[trial.name].kind) for trial in released.trials])
-    whole = kinds.value_counts(normalize=True)
-    # A round of every bank has some 23 trials.
-    part = kinds[:69].value_counts(normalize=True)
-    np.testing.assert_allclose(part[whole.index], whole, atol=0.03)
 
 
 def test_a_benchmark_is_read_as_it_was_written(tmp_path: Path, released: Benchmark) -> None:
@@ -207,40 +195,6 @@ def test_what_was_declared_not_resolvable_may_be_named_where_it_is_hidden_and_no
     assert list(bound["unknown"]) == [True, False]
 
 
-def test_sizes_that_differ_are_classed(tmp_path: Path) -> None:
-    sizes = {"s": 1.6, "t": 1.8, "u": 2.4}
-    labels = {name: _label(name, Kind.SINGLE, "a", multiple=size) for name, size in sizes.items()}
-    rows = [
-        {"trial": name, "alarm": name != "s", "named": "", "tied": False, "unknown": False} for name in sizes
-    ]
-    shares = power(judged(pd.DataFrame(rows).assign(method="m"), labels), "alarm")
-    assert list(shares.index) == [1.7, 2.4]
-    assert list(shares["trials"]) == [2, 1]
-    assert list(shares["m"]) == [0.5, 1.0]
-
-
-def test_records_within_a_record_stand_beside_it(tmp_path: Path) -> None:
-    _kept(tmp_path)
-    _kept(tmp_path / "other")
-    page = record_methods.write_methods_page(tmp_path).read_text(encoding="utf-8")
-    beside = page[page.index("## On other heaps") :]
-    first = "0 of 1 | 1 of 1 | 1 of 1 | 1 of 1 | 0 of 5 | 1.000 | 1.000 |  |"
-    for heaps in ("emulated", "[other](other/README.md)"):
-        assert f"| {ALONE} | {heaps} | {first}" in beside
-    assert (
-        "| BIC | emulated | 1 of 1 | 0 of 1 | 0 of 1 | 0 of 1 | 2 of 5 | 0.750 |  | 4 : 0, p = 0.12 |"
-        in beside
-    )
-
-
-def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
-    _kept(tmp_path)
-    page = record_methods.write_methods_page(tmp_path).read_text(encoding="utf-8")
-    assert "5 trials that every method has answered" in page
-    assert "| BIC | 1 of 1 |" in page
-    assert {path.name for path in tmp_path.glob("*.png")} == {"roc.png", "power.png"}
-
-
 def test_areas_and_paired_tests_are_those_of_the_textbook() -> None:
     assert auroc(np.array([3.0, 2.0]), np.array([1.0])) == 1.0
     assert auroc(np.array([1.0]), np.array([1.0])) == 0.5
@@ -250,30 +204,3 @@ def test_areas_and_paired_tests_are_those_of_the_textbook() -> None:
     assert Paired(0, 0, 5).p == 1.0
     one, other = pd.Series({"a": True, "b": True, "c": False}), pd.Series({"b": False, "c": True, "d": True})
     assert paired(one, other) == Paired(1, 1, 2)
-
-
-def test_weak_effects_are_not_among_the_strong() -> None:
-    rows = [
-        {"trial": one.trial, "alarm": False, "named": "", "tied": False, "unknown": False} for one in LABELS
-    ]
-    table = judged(pd.DataFrame(rows).assign(method="m"), {one.trial: one for one in LABELS})
-    parts = Parts(table)
-    assert list(parts.strong["trial"]) == ["s"]
-    assert list(parts.foreign["trial"]) == ["o"]
-
-
-def test_the_kept_record_is_of_the_released_trials_and_its_page_says_what_its_files_say(
-    tmp_path: Path,
-) -> None:
-    for file in KEPT.rglob("*"):
-        if file.is_file() and file.suffix != ".png":
-            (tmp_path / file.relative_to(KEPT)).parent.mkdir(parents=True, exist_ok=True)
-            (tmp_path / file.relative_to(KEPT)).write_bytes(file.read_bytes())
-    table = record_methods.read_record(tmp_path)
-    assert set(table["trial"]) <= set(load_answers())
-    assert list(dict.fromkeys(table["method"])) == ["search", *methods(None)]
-    written = record_methods.write_methods_page(tmp_path).read_text(encoding="utf-8")
-    assert written == (KEPT / "README.md").read_text(encoding="utf-8")
-    released = (benchmark_files.FOLDER / "README.md").read_text(encoding="utf-8")
-    assert markdown_table(summary(table)).strip() in released
-    assert markdown_table(areas(table)).strip() in released
