@@ -37,12 +37,13 @@ WAITING = {"deme": "DEM-Engine runs on a GPU alone"}
 
 INTRODUCTION = """# A card that travels
 
-Written by `python -m experiments.evidence.accuracy.travel page`. Ten cards, {count} grains each with a
-modulus divided by {softening:g}: here under the laws of a code, and in that code from what `dem-warp
-export` writes. Angles are of the `{fit}` fit, mean of {azimuths} views. A cell is one card in one code, with
-{seeds} heaps there when it is done. It is equivalent when two one-sided tests (guarded, level .05) show the two
-means to differ by less than {margin:g} degree. A cell that its first heaps do not show is made again with {fresh}
-fresh seeds on both sides, and these alone decide, at the same level: such a cell had two chances."""
+Written by `python -m experiments.evidence.accuracy.travel page`. Ten cards, {count} grains each
+with a modulus divided by {softening:g}: here under the laws of a code, and in that code from what
+`dem-warp export` writes. Angles are of the `{fit}` fit, mean of {azimuths} views. A cell is one
+card in one code, with {seeds} heaps there when it is done. It is equivalent when two one-sided
+tests (guarded, level .05) show the two means to differ by less than {margin:g} degree. A cell that
+its first heaps do not show is made again with {fresh} fresh seeds on both sides, and these alone
+decide, at the same level: such a cell had two chances."""
 
 BY_CODE = """## By code
 
