@@ -113,7 +113,6 @@ class Batch:
         return self.controllers[world].fraction(self.steps[world] * self.setups[world].time_step)
 
     def phase(self, world: int) -> str:
-        """Return the phase of a world."""
         return self.controllers[world].state.phase
 
     def case_name(self, world: int) -> str:

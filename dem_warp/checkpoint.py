@@ -39,7 +39,6 @@ class Checkpoints:
         self.folder, self.every = Path(folder), every
 
     def path(self, case: Case) -> Path:
-        """Return the file of a case."""
         return self.folder / f"{case_name(case)}.npz"
 
     def save(self, case: Case, maker: dict[str, Any], state: SceneState, snapshot: Snapshot) -> None:

@@ -47,7 +47,6 @@ class ClumpFit:
 
     @property
     def volume_error(self) -> float:
-        """Relative error of the volume."""
         return self.shape.volume / self.solid_volume - 1.0
 
 

@@ -59,7 +59,6 @@ class ClumpShape:
 
     @property
     def sphere_count(self) -> int:
-        """Number of spheres."""
         return len(self.radii)
 
     @property

@@ -32,7 +32,6 @@ class ContactForces:
     """Unit vectors from the partner to the grain, shape (n, 3)."""
 
     def __len__(self) -> int:
-        """Return the number of contacts."""
         return len(self.grains)
 
 

@@ -104,7 +104,6 @@ class _Camera:
         self._batch, self._probe = batch, ForceProbe(batch.solver)
 
     def frame(self) -> Frame:
-        """Return the present state."""
         solver, setup = self._batch.solver, self._batch.setups[0]
         step = int(solver.grains[0].step.numpy()[0])
         poses = solver.poses(0)
@@ -118,7 +117,6 @@ class _Camera:
         )  # fmt: skip
 
     def film(self, frames: tuple[Frame, ...]) -> Film:
-        """Return the film of some frames."""
         setup, scene = self._batch.setups[0], self._batch.cases[0].scene
         numbered = tuple(f"wall-{number}" for number in range(len(setup.walls)))
         return Film(

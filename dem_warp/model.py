@@ -167,7 +167,6 @@ class Grains:
 
     @property
     def count(self) -> int:
-        """Number of grains."""
         return len(self.positions)
 
 
@@ -238,7 +237,6 @@ class WorldSetup:
 
     @property
     def triangle_count(self) -> int:
-        """Triangles of all meshes."""
         return sum(wall.triangle_count for wall, _ in self.walls)
 
     @property

@@ -142,7 +142,6 @@ class DrawnGrains:
 
     @property
     def count(self) -> int:
-        """Number of grains."""
         return len(self.sizes)
 
     @property
@@ -200,12 +199,10 @@ class GrainPopulation:
     def of_classes(
         cls, shape: ClumpShape | ShapeMixture, material: Material, classes: SizeClasses
     ) -> GrainPopulation:
-        """Build a population of size classes."""
         return cls(shape, material, *_mean_and_sd(classes), classes)
 
     @property
     def size_range(self) -> tuple[float, float]:
-        """Smallest and largest possible size."""
         if self.classes is not None:
             return self.classes.sizes[0], self.classes.sizes[-1]
         reach = SIZE_LIMIT * self.size_sd

@@ -63,7 +63,6 @@ class _State(ctypes.Structure):
     )
 
     def put(self, case: int, fraction: float, phase: str) -> None:
-        """Set case, fraction done and phase."""
         self.fraction, self.phase, self.case = fraction, phase.encode()[:PHASE_LENGTH], case
 
 
@@ -139,11 +138,9 @@ class Processes:
         self._states: Any = None
 
     def __enter__(self) -> Processes:
-        """Return self; the processes start later."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End the processes."""
         self.end()
 
     def run(

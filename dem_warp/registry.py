@@ -60,7 +60,6 @@ class Registry(Mapping[str, T], Generic[T]):
 
     @cached_property
     def _outside(self) -> dict[str, T]:
-        """Objects of installed packages by name."""
         outside: dict[str, T] = {}
         known = ChainMap(outside, self._built_in)  # type: ignore[arg-type]
         for entry in sorted(entry_points(group=self._group), key=lambda entry: entry.name):

@@ -54,12 +54,10 @@ class Layout:
 
     @property
     def grain_total(self) -> int:
-        """Grain slots of the batch."""
         return self.world_count * self.grain_count
 
     @property
     def sphere_total(self) -> int:
-        """Sphere slots of the batch."""
         return self.grain_total * self.sphere_count
 
 

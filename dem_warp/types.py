@@ -82,7 +82,6 @@ class Build:
 
     @property
     def name(self) -> str:
-        """Name of the compiled module."""
         way = "warp" if self.cooperative else "serial"
         sizes = (self.sphere_count, self.wall_count)
         extras = (*(m.name for m in self.mechanisms), *self.forms.changed, *("mesh",) * self.has_mesh)

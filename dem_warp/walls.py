@@ -75,7 +75,6 @@ class _Oriented:
 
     @property
     def axis(self) -> Vector:
-        """Unit vector of the direction."""
         x, y, z = (
             float(c) for c in np.asarray(self._direction, dtype=float) / np.linalg.norm(self._direction)
         )
@@ -257,7 +256,6 @@ class Mesh:
 
     @property
     def triangle_count(self) -> int:
-        """Number of triangles."""
         return len(self.faces)
 
     @property

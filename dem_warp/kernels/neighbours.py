@@ -67,7 +67,6 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def sort(array: wp.array(dtype=int), first: int, count: int):
-        """Sort a few numbers in place."""
         for k in range(1, count):
             value = array[first + k]
             place = int(k)

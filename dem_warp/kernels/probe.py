@@ -14,7 +14,6 @@ from dem_warp.types import Build, device_structs
 
 @functools.cache
 def probe_kernels(build: Build) -> SimpleNamespace:
-    """Return `measure` of one build."""
     precision = build.precision
     real, vec3 = precision.real, precision.vec3
     types = device_structs(precision)

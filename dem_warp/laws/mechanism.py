@@ -74,7 +74,6 @@ class Mechanism:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Value of each parameter."""
         return {name: float(getattr(self, name)) for name in self.parameter_names()}
 
     def acts_between(self, kind: str) -> bool:

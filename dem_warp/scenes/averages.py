@@ -26,13 +26,9 @@ class MeanOverTime(NamedTuple):
 def mean_over_time(series: ArrayLike) -> MeanOverTime | None:
     """Average a stationary series of equally spaced looks; return None for fewer than LEAST_LOOKS.
 
-    The variance of the mean is 2 tau / n times that of a look, with the integrated autocorrelation time tau.
-    It is corrected to first order for using the mean of the same series.
-
-    References
-    ----------
-    A. D. Sokal, Monte Carlo methods in statistical mechanics (1996), section 3: the window and its bias.
-    U. Wolff, Computer Physics Communications 156 (2004) 143-153, equation 49: the correction.
+    The variance of the mean is 2 tau / n times that of a look, with the integrated autocorrelation time tau
+    (Sokal, Monte Carlo methods in statistical mechanics, 1996, section 3), corrected for using the mean of
+    the same series (Wolff, Computer Physics Communications 156, 2004, 143-153, equation 49).
     """
     values = np.asarray(series, dtype=np.float64)
     count = len(values)

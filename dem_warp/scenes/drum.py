@@ -147,7 +147,6 @@ class Drum(PouredScene):
 
     @property
     def view(self) -> DrumView:
-        """Drum and picture."""
         return DrumView(self.diameter / 2, self.length, self.picture, self.camera_distance)
 
     @property

@@ -69,7 +69,6 @@ class PouredController(ABC, Generic[StateT]):
         return (done + min(time - self.state.phase_start, length)) / sum(expected.values())
 
     def look(self, view: WorldView) -> Decision:
-        """Decide what happens next."""
         return self.phases[self.state.phase].look(view)
 
     def rests(self, view: WorldView) -> bool:

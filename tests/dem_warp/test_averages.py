@@ -31,12 +31,6 @@ def test_intervals_of_a_mean_over_time_cover_it_as_often_as_they_say(memory: flo
     assert 0.93 < hits / SERIES < 0.97
 
 
-def test_the_error_that_forgets_the_memory_is_far_too_small() -> None:
-    series = remembering(0.9, 1000, seed=1)
-    naive = stats.t.ppf(0.5 + LEVEL / 2, 999) * series.std(axis=1, ddof=1) / np.sqrt(1000)
-    assert np.mean(np.abs(series.mean(axis=1)) <= naive) < 0.5
-
-
 def test_the_memory_is_the_integrated_autocorrelation_time() -> None:
     found = [mean_over_time(series).memory for series in remembering(0.8, 1000, seed=2)[:300]]
     # (1 + f) / (1 - f) / 2 of a series that keeps the part f, 4.5 looks; the rule's window cuts off 1 %.

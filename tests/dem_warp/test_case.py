@@ -1,7 +1,6 @@
 """Cases: what they refuse, and what of them determines a result."""
 
 import json
-import math
 from dataclasses import fields, is_dataclass, replace
 
 import pytest
@@ -27,21 +26,14 @@ from dem_warp.laws.linear_cohesion import LinearCohesion
     ("build", "message"),
     [
         (lambda: LiftedCylinder(-0.03, 0.1, STEEL), r"LiftedCylinder.diameter: must be positive.* got -0.03"),
-        (lambda: LiftedCylinder(0.03, math.nan, STEEL), r"LiftedCylinder.height: .* got nan"),
-        (lambda: replace(SMALL_TUBE, lift_speed=0.0), r"LiftedCylinder.lift_speed: .* got 0.0"),
-        (lambda: replace(SMALL_TUBE, rain_rate=math.inf), r"LiftedCylinder.rain_rate: .* got inf"),
         (
             lambda: replace(SMALL_TUBE, grain_count=0),
             r"LiftedCylinder.grain_count: must be at least 1, got 0",
         ),
-        (lambda: replace(SMALL_TUBE, duration=-1.0), r"LiftedCylinder.duration: must be positive.* got -1.0"),
         (lambda: GrainPopulation(PYRAMID, GRAIN, size_mean=0.0), r"size_mean: must be positive, got 0.0"),
         (lambda: GrainPopulation(PYRAMID, GRAIN, size_sd=0.4), r"size_sd: .* below size_mean / 3, got 0.4"),
         (lambda: GrainPopulation(PYRAMID, GRAIN, size_sd=-0.1), r"size_sd: must be at least 0 .* got -0.1"),
-        (lambda: Numerics(time_step_fraction=1.5), r"time_step_fraction: .* at most 1, got 1.5"),
-        (lambda: Numerics(skin=0.0), r"Numerics.skin: must be positive and finite \[m\], got 0.0"),
         (lambda: Numerics(precision="half"), r"precision: must be one of mixed, double, got 'half'"),
-        (lambda: Numerics(modulus_scale=0.5), r"modulus_scale: must be at least 1, got 0.5"),
         (lambda: replace(small_case(), seed=-1), r"Case.seed: must be an integer from 0 .* got -1"),
     ],
 )

@@ -25,7 +25,6 @@ from dem_warp.device import resolve_device
 from dem_warp.scenes.lifted_cylinder import LiftState
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.solver import CHUNK
-from dem_warp.walls import Motion
 
 NEVER, ALWAYS = 1e9, 0.0
 """Times between two checkpoints [s]: no checkpoint at all, and one after every look of a controller."""
@@ -293,26 +292,6 @@ def test_a_run_goes_on_where_no_checkpoint_can_be_written(tmp_path, caplog):
 def test_an_interval_is_not_negative(tmp_path):
     with pytest.raises(ValueError, match=r"Checkpoints.every: must be 0 or more \[s\], got -1"):
         simulate([small_case()], device=DEVICE, checkpoint=tmp_path, checkpoint_every=-1.0)
-
-
-def test_a_world_goes_on_in_another_batch_with_its_walls_in_motion():
-    """Its plate rises, sinks after a while, and has been taken into a batch of more grains in between."""
-    whole, first = (solve(pile(), precision="mixed") for _ in range(2))
-    second = solve(pile(2, count=40), pile(), precision="mixed")
-    for solver in (whole, first):
-        solver.move_wall(0, 0, Motion((0.0, 0.0, 0.01), spin=(0.1, 0.0, 0.0)))
-        solver.advance(10)
-    put_snapshot(second, 1, take_snapshot(first, 0))
-    bystander = take_snapshot(second, 0)
-    assert_same_bits(take_snapshot(second, 1), take_snapshot(first, 0))
-    for solver, w in ((whole, 0), (second, 1)):
-        solver.move_wall(w, 0, Motion((0.0, 0.0, -0.01)))
-        solver.advance(10)
-    assert_same_bits(state(second, 1), state(whole, 0))
-    fresh = solve(pile(2, count=40), precision="mixed")
-    assert_same_bits(bystander, take_snapshot(fresh, 0))
-    fresh.advance(10)
-    assert_same_bits(state(second, 0), state(fresh, 0))
 
 
 def test_a_snapshot_of_another_world_is_refused_and_changes_nothing():

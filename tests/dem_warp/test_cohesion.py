@@ -28,7 +28,6 @@ from worlds import (
     small_case,
     solve,
     state,
-    static_overlap,
     world,
 )
 
@@ -184,16 +183,6 @@ def test_a_bridge_pulls_by_willett_until_it_breaks(partner):
     assert -force[overlap < 0.0].sum() * step == pytest.approx(work, abs=-force.min() * step)
 
 
-@pytest.mark.parametrize("partner", PARTNERS)
-def test_there_is_no_bridge_before_the_surfaces_touch(partner):
-    overlap, force = drive(sticking(WATER), -0.9 * rupture(WATER), 1e-5, partner)
-    assert (force[overlap <= 0.0] == 0.0).all()
-    radius = 2.0 * effective_radius(partner)
-    touching = overlap[overlap > 0.0]
-    expected = hertz(radius / 2.0, touching) - willett(WATER, radius, np.zeros(touching.size))
-    np.testing.assert_allclose(force[overlap > 0.0], expected, **SEEN)
-
-
 def test_attractions_add_up_and_each_ends_at_its_own_distance():
     radius, work = effective_radius(1.0), STICKY.work_of_adhesion
     first, last = 2e-5, -1.2 * rupture(WATER)
@@ -248,13 +237,6 @@ def test_a_grain_hangs_by_jkr_up_to_the_pull_off_force():
     assert overlap[0] == pytest.approx(free, rel=1e-9)
     force = np.array([jkr_force(work, RADIUS, d) for d in overlap])
     np.testing.assert_allclose(force / most, -SHARES[:-1], **AT_REST)
-
-
-def test_a_grain_hangs_by_a_bridge_that_pulls_more_than_its_weight():
-    most = float(willett(WATER, 2.0 * RADIUS, np.array(0.0)))
-    overlap = hang(WATER, static_overlap(sticking(), most), most)
-    expected = [static_overlap(sticking(), (1.0 - share) * most) for share in SHARES[:-1]]
-    np.testing.assert_allclose(overlap, expected, rtol=1e-9)
 
 
 def test_a_ceiling_that_adheres_holds_a_grain_that_does_not_stick_to_another():

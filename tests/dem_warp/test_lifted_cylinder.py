@@ -122,13 +122,6 @@ def test_processes_and_callbacks_change_nothing(heap):
     assert not np.array_equal(results[1].sizes[:5], results[0].sizes[:5])
 
 
-def test_a_second_shape_of_fraction_0_changes_no_bit(heap):
-    # The other shape has more spheres, whose kernels differ.
-    other = ClumpShape.from_spheres(1e-3 * np.arange(36).reshape(12, 3), np.full(12, 1e-3))
-    case = with_shapes((other, PYRAMID), (0.0, 1.0))
-    assert_same_result(simulate([case], device="cpu", workers=1)[0], heap)
-
-
 def test_equal_shapes_under_two_names_are_one_and_do_not_segregate(heap):
     [twins] = simulate([with_shapes((PYRAMID, PYRAMID), (0.5, 0.5))], device="cpu", workers=1)
     assert_same_result(twins, heap)
@@ -197,17 +190,6 @@ def test_no_cases_give_no_results():
 def test_an_unknown_device_is_refused():
     with pytest.raises(ValueError, match=r"device: must be one of .*cpu.*, got 'gpu'"):
         simulate([small_case()], device="gpu")
-
-
-def test_sizes_stay_within_their_limits_and_follow_their_distribution():
-    population = GrainPopulation(PYRAMID, GRAIN, size_mean=1.2, size_sd=0.1)
-    sizes = population.draw_sizes(4000, np.random.default_rng(7))
-    assert (np.abs(sizes - 1.2) <= 0.3).all()
-    # Standard errors of 4,000 draws, four of them: 0.1 / sqrt(4000), and 0.1 / sqrt(8000). The truncation
-    # takes 1.3 %.
-    assert sizes.mean() == pytest.approx(1.2, abs=4 * 0.1 / np.sqrt(4000))
-    assert sizes.std() == pytest.approx(0.0987, abs=4 * 0.1 / np.sqrt(8000))
-    np.testing.assert_array_equal(sizes, population.draw_sizes(4000, np.random.default_rng(7)))
 
 
 def end_of_lift(riding: int) -> tuple[Decision, Decision, float]:

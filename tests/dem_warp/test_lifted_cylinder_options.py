@@ -99,21 +99,3 @@ def test_air_holds_a_falling_grain_at_its_terminal_speed():
     # e**-20 is left of the way to the terminal speed g / rate; a step of first order is off by rate * step.
     velocity = state(solver)["velocities"][0]
     np.testing.assert_allclose(velocity, [0.0, 0.0, -9.81 / rate], rtol=rate * step, atol=0.0)
-
-
-@pytest.mark.parametrize(
-    ("options", "rule"),
-    [
-        ({"tilt": -0.1}, r"LiftedCylinder.tilt: must be finite and 0 or more \[rad\], got -0.1"),
-        ({"tilt": 1.6}, r"LiftedCylinder.tilt: must be below 1.5708 \[rad\], got 1.6"),
-        ({"plate_friction": -0.1}, r"LiftedCylinder.plate_friction: must be finite and 0 or more, got -0.1"),
-        ({"plate_friction_excess": math.inf}, r"LiftedCylinder.plate_friction_excess: .* got inf"),
-        ({"vibration_amplitude": -1e-3}, r"LiftedCylinder.vibration_amplitude: .* got -0.001"),
-        ({"vibration_frequency": 0.0}, r"LiftedCylinder.vibration_frequency: must be positive .* got 0.0"),
-        ({"vibration_hold": math.nan}, r"LiftedCylinder.vibration_hold: .* got nan"),
-        ({"air_drag": -1.0}, r"LiftedCylinder.air_drag: must be finite and 0 or more \[1/s\], got -1.0"),
-    ],
-)
-def test_options_out_of_range_are_refused(options, rule):
-    with pytest.raises(ValueError, match=rule):
-        replace(SMALL_TUBE, **options)

@@ -21,7 +21,6 @@ from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.contact_law import contact_law
 from dem_warp.laws.hysteretic_spring import HystereticSpring
 from dem_warp.laws.jkr import JKR
-from dem_warp.laws.library import parameters
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.model import WorldSetup
@@ -40,10 +39,6 @@ def with_mechanism(setup: WorldSetup, *mechanisms: Mechanism) -> WorldSetup:
         gravity=setup.gravity,
         skin=setup.skin,
     )
-
-
-def test_parameters_of_mechanisms_have_names_of_their_own():
-    assert len(set(parameters())) == len(parameters())
 
 
 def test_mechanisms_stand_in_the_order_of_the_library():

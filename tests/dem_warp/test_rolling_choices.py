@@ -71,18 +71,6 @@ def test_cdt_acts_for_whole_steps_and_reverses_a_slow_roll():
     np.testing.assert_allclose(seen / kick, [0.25, -0.75, 0.25, -0.75, 0.25, -0.75, 0.25], rtol=1e-6)
 
 
-def test_a_relative_constant_torque_stops_a_roll_and_reverses_none():
-    spin = 5.0
-    stop = spin * INERTIA / (MU * RADIUS * WEIGHT) / TIME_STEP
-    seen = spun(rolling("relative_constant"), (0.0, spin, 0.0), math.ceil(stop) + 200).spins[:, 0, 1]
-    time = np.arange(len(seen))
-    line = spin * (1.0 - time / stop)
-    # The spring that holds is wound up within the step that it is as stiff as; the swing after is damped.
-    np.testing.assert_allclose(seen[time < stop - 2], line[time < stop - 2], rtol=0.0, atol=spin / stop)
-    assert np.abs(seen[-50:]).max() < 1e-6 * spin
-    assert -seen.min() < 5.0 * spin / stop
-
-
 SPRINGS = {
     "epsd2": rolling("epsd2"),
     "rocky_3": rolling("rocky_3"),

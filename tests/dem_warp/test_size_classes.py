@@ -70,20 +70,6 @@ def test_a_world_of_classes_weighs_what_it_should() -> None:
     assert np.mean(run.sizes**3) == pytest.approx(1.0, abs=0.015)
 
 
-def test_a_population_of_classes_tells_of_its_ends() -> None:
-    assert POPULATION.size_range == (CLASSES.sizes[0], CLASSES.sizes[-1])
-    assert POPULATION.smallest_sphere == pytest.approx(PYRAMID.radii.min() * CLASSES.sizes[0], rel=1e-12)
-    assert POPULATION.size_mean == pytest.approx(np.mean(CLASSES.sizes), rel=1e-12)
-    assert GrainPopulation(PYRAMID, GRAIN).size_range == pytest.approx((0.85, 1.15), rel=1e-12)
-
-
-def test_a_scaled_shape_is_the_shape_of_scaled_spheres() -> None:
-    scaled = PYRAMID.scaled(1.7)
-    other = ClumpShape.from_spheres(PYRAMID.centers * 1.7, PYRAMID.radii * 1.7)
-    assert scaled.volume == pytest.approx(other.volume, rel=1e-9)
-    assert scaled.inertia_over_mass == pytest.approx(other.inertia_over_mass, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("sizes", "fractions", "message"),
     [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dem_warp.scenes.drum import surface_angles
-from dem_warp.scenes.surfaces import bed_level, column_tops, flank_angle, profile, slope
+from dem_warp.scenes.surfaces import bed_level, column_tops, flank_angle, profile
 
 REACH = 1e-3
 
@@ -38,12 +38,6 @@ def test_a_profile_averages_the_highest_centres_along_y():
     x, z = profile(places, 1.0)
     assert x.tolist() == [-3.0, 1.0]
     assert z.tolist() == [-1.0, 6.0]
-
-
-def test_the_slope_of_a_line_is_its_own_and_two_points_have_none():
-    x = np.array([0.0, 1.0, 4.0])
-    assert slope(x, 3.0 - 0.5 * x) == pytest.approx(-0.5, rel=1e-12)
-    assert slope(x[:2], x[:2]) is None
 
 
 @pytest.mark.parametrize("degrees", [5.0, 30.0, 60.0])

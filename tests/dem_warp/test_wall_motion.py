@@ -268,22 +268,6 @@ def test_a_wall_too_fast_for_its_cycle_is_flagged():
     assert solver.flags.numpy()[0] & WorldFlag.LATE_REBUILD
 
 
-def test_an_order_to_stay_where_it_is_changes_nothing():
-    # A ball sticks to a slope by the memory of its contact; the order comes with a rebuild of the lists.
-    contact = pair(restitution=0.3, friction=0.9, rolling=0.9)
-    ends = []
-    for ordered in (False, True):
-        ball = grains([0.0, 0.0, RADIUS - OVERLAP])
-        solver = solve(world(ball, contact, TIME_STEP, walls=(Plane(),), gravity=downhill(20.0)))
-        solver.advance(3)
-        if ordered:
-            solver.move_wall(0, 0, Motion())
-        solver.advance(5)
-        ends.append(state(solver))
-    assert np.abs(ends[0]["positions"][0, 1]) < 1e-6
-    assert_same_bits(*ends)
-
-
 @pytest.mark.parametrize(
     ("build", "message"),
     [
