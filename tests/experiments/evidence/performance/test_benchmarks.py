@@ -18,7 +18,6 @@ from experiments.cases.workers.batches import device_bytes
 from experiments.evidence.performance import columns as scene
 from experiments.evidence.performance.columns import Columns, reference_case
 from experiments.evidence.performance.contact_counts import count_contacts, placed_centers
-from experiments.evidence.performance.grain_cost import bed
 from experiments.evidence.performance.heap_throughput import speed_tables
 from experiments.evidence.performance.performance_record import record_page
 from experiments.evidence.performance.result_pages import parse_counts
@@ -139,17 +138,6 @@ def test_near_is_what_may_touch_within_the_paths_of_both(small_columns: Columns)
 
 
 # ---- beds, tables, record ----------------------------------------------------------------------------------
-
-
-def test_a_bed_starts_apart_inside_its_tube() -> None:
-    setup = bed(200)
-    shape, positions = setup.shapes[0], setup.grains.positions
-    gaps = np.linalg.norm(positions[:, None] - positions[None], axis=2) + np.eye(200)
-    assert gaps.min() >= 2.0 * shape.bounding_radius * (1.0 - 1e-12)  # rounding
-    tube = setup.walls[1][0]
-    assert isinstance(tube, Cylinder)
-    assert np.linalg.norm(positions[:, :2], axis=1).max() + shape.bounding_radius <= tube.radius
-    assert positions[:, 2].min() >= shape.bounding_radius
 
 
 def test_counts_are_read_from_a_list() -> None:
