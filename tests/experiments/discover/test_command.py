@@ -60,7 +60,7 @@ def test_a_search_on_photographs_needs_what_they_show(tmp_path: Path) -> None:
     for more in ((), ("--dry-run",)):
         code, _, err = discover(data, "--photographs-only", "--out", tmp_path / "out", *more)
         assert code == 2
-        assert "measured.csv: a search on photographs only needs what they show: one of flank_angle" in err
+        assert "measured.csv: --photographs-only needs an observable that photographs show: flank_angle" in err
         assert "got t75" in err
 
 
@@ -86,7 +86,7 @@ def test_a_folder_in_use_is_never_written_to(tmp_path: Path) -> None:
     (tmp_path / "out" / "mine.txt").write_text("kept", encoding="utf-8")
     code, _, err = discover(DATA / "nothing-missing.csv", "--out", tmp_path / "out")
     assert code == 2
-    assert "must be new or empty; --resume goes on in it" in err
+    assert "the folder is not empty. Add --resume" in err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine.txt"]
 
 

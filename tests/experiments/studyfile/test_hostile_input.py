@@ -128,10 +128,10 @@ HOSTILE = {
         "heap s.toml --device cpu --set E=much", ("--set: E", "number", "much"), {"s.toml": SMALL_STUDY}
     ),
     "a used folder": Hostile(
-        "heap s.toml --device cpu --out .", (".", "new or empty", "used"), {"s.toml": SMALL_STUDY}
+        "heap s.toml --device cpu --out .", (".", "the folder is not empty", "--resume"), {"s.toml": SMALL_STUDY}
     ),
     "a file for a folder": Hostile(
-        "heap s.toml --device cpu --out s.toml", ("s.toml", "new or empty", ", got a file"),
+        "heap s.toml --device cpu --out s.toml", ("s.toml", "must be a folder", ", got a file"),
         {"s.toml": SMALL_STUDY},
     ),
     "a bank of nothing": Hostile(
