@@ -18,8 +18,8 @@ from pydantic import Field
 
 from dem_warp import Case, effective_moduli
 from dem_warp.laws.conventions import Rolling
+from dem_warp.model import GRAVITY
 from dem_warp.registry import Registry
-from dem_warp.scenes.poured_scene import GRAVITY
 from experiments.io.toml_files import read_toml
 from experiments.io.units import Quantity
 from experiments.studyfile import Study, StudyError

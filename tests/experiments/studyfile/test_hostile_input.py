@@ -128,7 +128,7 @@ HOSTILE = {
         "heap s.toml --device cpu --set E=much", ("--set: E", "number", "much"), {"s.toml": SMALL_STUDY}
     ),
     "a used folder": Hostile(
-        "heap s.toml --device cpu --out .", (".", "the folder is not empty", "--resume"), {"s.toml": SMALL_STUDY}
+        "heap s.toml --device cpu --out .", (".", "folder is not empty", "--resume"), {"s.toml": SMALL_STUDY}
     ),
     "a file for a folder": Hostile(
         "heap s.toml --device cpu --out s.toml", ("s.toml", "must be a folder", ", got a file"),
