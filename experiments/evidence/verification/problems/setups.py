@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dem_warp import ClumpShape, ContactLaws, Interaction, Material, Mechanism
-from dem_warp.model import ContactCoefficients, Grains, WorldSetup
+from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
 from dem_warp.solver import Solver
 from dem_warp.walls import Plane, Wall
 
 PRECISIONS = {"double": "float64", "mixed": "production precision"}
 """Those of a solver, in words."""
 
-GRAVITY = 9.81
 WALLS = 2
 """Walls of every world, far-off planes where a problem needs none: so that worlds share compiled kernels."""
 
