@@ -147,8 +147,7 @@ def locked(folder: Path, resume: bool = False) -> Iterator[None]:
     try:
         # another run may have come and gone since
         require_usable(folder, resume)
-        if resume:
-            remove_leftovers(folder)
+        remove_leftovers(folder)
         yield
     finally:
         if made and not is_used(folder):

@@ -10,7 +10,7 @@ from experiments.cases.engines.engines import engine_of
 from experiments.cases.store.outputs import changed_outputs
 from experiments.cases.store.store import Store
 from experiments.io.errors import StoreError
-from experiments.io.files import JOURNAL, LOCK
+from experiments.io.files import JOURNAL, LOCK, has_temporary_name
 from experiments.studyfile import Study
 from experiments.studyfile.manifest import describe, differences, read_manifest, write_manifest
 
@@ -59,7 +59,7 @@ def is_used(folder: Path) -> bool:
     # pathlib raises where a name is too long for the system
     if not os.path.isdir(folder):
         return os.path.lexists(folder)
-    return any(path.name not in (LOCK, JOURNAL) for path in folder.iterdir())
+    return any(path.name not in (LOCK, JOURNAL) and not has_temporary_name(path) for path in folder.iterdir())
 
 
 def require_unused(folder: Path, hint: str = "") -> None:

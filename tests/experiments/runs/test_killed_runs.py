@@ -19,11 +19,15 @@ from cone_engine import SEEDS, cone_engine
 
 from experiments.cases import execute
 from experiments.cases.engines import engines
+from experiments.cases.show import heap
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover import engine_simulator
 from experiments.measurement.case_observables import Observed
 from experiments.report.material_card import write_material_card
-from experiments.runs import calibration
+from experiments.runs import bridging, calibration, one_heap, search
+
+LOADED = (bridging, calibration, one_heap, search)
+"""Modules that each process would load anew."""
 
 KILLS = 10
 KILLED = 99
@@ -40,6 +44,17 @@ class Direct(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         pass
+
+
+FEW = """
+[campaign.noise_floor]
+replicates = 5
+
+[discover]
+mechanisms = ["contact_adhesion"]
+settings = { bank_points = 40, bank_mechanism_points = 6 }
+"""
+"""Cases that a campaign and a bank need at least."""
 
 
 @dataclass
@@ -134,6 +149,7 @@ def _stand_ins(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setattr(calibration, "write_report", write_results)
         patch.setattr(calibration, "heap_pictures", lambda *_: [])
         patch.setattr(calibration, "verified_heap", lambda *_: None)
+        patch.setattr(heap, "_write_pictures", lambda *_: None)
         patch.setenv(SEEDS, str(tmp_path_factory.mktemp("seeds") / "seeds.txt"))
         yield
 
@@ -141,7 +157,7 @@ def _stand_ins(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> Path:
     path = tmp_path_factory.mktemp("study") / "small.toml"
-    path.write_text(f"{small_text}\n[campaign.noise_floor]\nreplicates = 5\n", encoding="utf-8")
+    path.write_text(f"{small_text}{FEW}", encoding="utf-8")
     return path
 
 
