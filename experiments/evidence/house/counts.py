@@ -2,7 +2,7 @@
 
 A room is a folder directly in a package, or a file there. An import between rooms is a pair of rooms. A floor is
 the longest chain of imports below a room. Like code is a run of six statements that are equal once names and
-values are erased, and that at most eight files share.
+values are erased, and that at most eight files share; a run that only declares fields is data.
 """
 
 from __future__ import annotations
@@ -160,7 +160,8 @@ def like_code() -> set[tuple[str, str]]:
         statements = list(_statements(tree(name).body))
         for index in range(len(statements) - LIKE_STATEMENTS + 1):
             run = statements[index : index + LIKE_STATEMENTS]
-            places[tuple(shape for shape, _ in run)].add((name, run[0][1]))
+            if not all(shape.startswith("AnnAssign") for shape, _ in run):
+                places[tuple(shape for shape, _ in run)].add((name, run[0][1]))
     pairs = set()
     for found in places.values():
         if len({name for name, _ in found}) <= LIKE_FILES:
