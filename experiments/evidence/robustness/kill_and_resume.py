@@ -161,10 +161,9 @@ def killed_run(
             before = now
     last = start(words, folder)
     if run % 4 == 0 and is_used(folder):
+        program = [sys.executable, "-c", "from experiments.cli import main; main()"]
         second = subprocess.run(
-            [*last.args, "--resume"] if "--resume" not in last.args else list(last.args),  # type: ignore[operator, arg-type]
-            capture_output=True,
-            check=False,
+            [*program, *words, "--out", str(folder), "--resume"], capture_output=True, check=False
         )
         if last.poll() is None and second.returncode != BUSY:
             fault = f"a second run in the folder ended with {second.returncode}"
