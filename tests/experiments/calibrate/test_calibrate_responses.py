@@ -64,6 +64,7 @@ class TwoScenes:
 
     target: Target
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
+    file: Path = Path("study.toml")
     factors: tuple[Factor, ...] = FACTORS
     labels: Mapping[str, str] = field(
         default_factory=lambda: {factor.name: f"parameter {factor.name}" for factor in FACTORS}
