@@ -26,7 +26,7 @@ def doctor(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Examine this machine: GPU, driver, kernels' cache, cores, memory, OpenGL, and what will be used.
+    """Check this machine: GPU, driver, kernel cache, cores, memory, OpenGL, and what will be used.
 
     The exit code is 0 where cases can be simulated, else 1.
     """

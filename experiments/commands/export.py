@@ -1,4 +1,4 @@
-"""``dem-warp export``: a card or a study leaves for another code."""
+"""``dem-warp export``: a card or a study as input of another code."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def export(
     source: Annotated[
         Path | None,
         typer.Argument(
-            metavar="CARD|STUDY", help="Material card or study file; left out: the paper's buckwheat."
+            metavar="CARD|STUDY", help="Material card or study file. Default: the paper's buckwheat."
         ),
     ] = None,
-    to: Annotated[str, typer.Option(metavar="NAME", help="Code that it leaves for, as liggghts.")] = "",
+    to: Annotated[str, typer.Option(metavar="NAME", help="Target code, e.g. liggghts.")] = "",
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor; left out: its middle."),
+        typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor. Default: its middle."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
     scene: Annotated[
@@ -34,7 +34,8 @@ def export(
     approximate: Annotated[
         bool,
         typer.Option(
-            "--approximate", help="Take the nearest for what the code lacks, with a warning in the input."
+            "--approximate",
+            help="Replace what the code lacks by the nearest it has, with a warning in the input.",
         ),
     ] = False,
     out: Out = None,
@@ -43,11 +44,11 @@ def export(
 ) -> None:
     """Write the same test as the input of another code: clump, walls, filling, lift, laws, and a README.
 
-    What the code lacks is refused by name, or approximated and told at the top of the input.
+    What the code lacks is rejected by name, or approximated with a warning at the top of the input.
     """
     with clear_errors():
         from experiments.cases import require_unused
-        from experiments.commands.leaving import exported_test, study_of, told_of_bridge
+        from experiments.commands.leaving import exported_test, study_of, with_bridge_warning
         from experiments.export import export_input, write_export
         from experiments.io.files import require_folder
         from experiments.runs.choices import default_folder
@@ -56,7 +57,7 @@ def export(
         study = study_of(source, scale)
         values = study.natural_settings(assignments(settings or []), "--set")
         test = exported_test(study, values, seed, scene or TARGET_SCENE)
-        translation = told_of_bridge(export_input(test, to, approximate), study, to)
+        translation = with_bridge_warning(export_input(test, to, approximate), study, to)
         folder = out or default_folder(study, to)
         require_unused(folder)
         require_folder(folder)

@@ -1,4 +1,4 @@
-"""Cards and studies that leave for another code."""
+"""Cards and studies that are exported to another code."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def study_of(path: Path | None, scale: str | None) -> Study:
     return load_study(path, scale)
 
 
-def told_of_bridge(translation: Translation, study: Study, to: str) -> Translation:
-    """Warn of values that a bridge has corrected for another solver than the one that they leave for."""
+def with_bridge_warning(translation: Translation, study: Study, to: str) -> Translation:
+    """Add a warning if a bridge has corrected the values for another code."""
     engine = study.solver.corrected_for
     if engine in (None, to):
         return translation
@@ -37,7 +37,7 @@ def told_of_bridge(translation: Translation, study: Study, to: str) -> Translati
 def exported_test(
     study: Study, values: Mapping[str, float], seed: int, scene: str = TARGET_SCENE
 ) -> ExportedTest:
-    """Choose one case of a study to leave: values by factor name in natural units, the middle where left out.
+    """Build one case of a study for export; a factor without a value is at its middle.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Results on standard output, as people read them."""
+"""Results as text on standard output."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ if TYPE_CHECKING:
 
 
 def show_stage(name: str, result: StageResult) -> None:
-    """Show what a stage decided, as it ends."""
+    """Show the decisions of a stage."""
     for decision in result.decisions:
         messages.print(f"{name.replace('_', ' ')}: {decision.outcome}")
 
 
 def print_study(study: Study, resources: Resources) -> None:
-    """Say which study runs where, and what is doubtful about it."""
+    """Print the study, its workers, and doubts about it."""
     messages.print(f"{study.name}, on {resources}", study.note, sep="\n")
     print_narrowness(study)
 
 
 def print_narrowness(study: Study) -> None:
-    """Say that the container is narrow for its grains, where it is."""
+    """Warn if the container is narrow for its grains."""
     if narrow := study.narrowness():
         messages.print(f"Doubtful: {narrow}")
 
 
 def print_clump(facts: Mapping[str, Any]) -> None:
-    """Show a clump's facts, one a line, without its spheres."""
+    """Show a clump's facts, one per line, without its spheres."""
     moments = ", ".join(f"{moment:.4f}" for moment in facts["inertia_over_mass_mm2"])
     typer.echo(f"spheres {facts['sphere_count']}, bounding radius {facts['bounding_radius_mm']:.3f} mm")
     typer.echo(f"volume {facts['volume_mm3']:.4f} mm3 (overlaps counted once)")
@@ -66,7 +66,7 @@ def _quality(trial: Mapping[str, Any]) -> str:
 
 
 def print_measured(simulated: Heap) -> None:
-    """Show the angle of a heap; for a test that leaves none, what else it measures, one a line."""
+    """Show the angle of a heap, or for a test without heaps its other observables, one per line."""
     if simulated.angle:
         typer.echo(f"{simulated.angle.mean:.2f} +- {simulated.angle.se:.2f} degrees")
         return
@@ -98,7 +98,7 @@ def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
 
 
 def print_findings(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Say how files of heaps were read, and why angles are doubtful."""
+    """Print how heap files were read, and why angles are doubtful."""
     for row in rows:
         if row["mean"] is not None and row["source"] != "photograph":
             messages.print(f"Read: {row['picture']}: {row['source']}")

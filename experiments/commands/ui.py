@@ -16,29 +16,25 @@ UI_EXAMPLE = "Example: [bold]dem-warp ui mygrains[/]"
 def ui(
     folder: Annotated[
         Path | None,
-        typer.Argument(metavar="DIR", help="Folder of the files and the runs. Left out: the current one."),
+        typer.Argument(metavar="DIR", help="Folder of the files and the runs. Default: the current folder."),
     ] = None,
     port: Port = 0,
     no_browser: NoBrowser = False,
 ) -> None:
-    """Start from a page in the browser: the grain, the test, the ranges, photographs; then run and watch.
+    """Open a page in the browser to describe grain, test, ranges and photographs, then run and watch.
 
-    It writes the study file, and tells the command line, that you would write and call yourself. Runs that it
-    started go on when it ends: dem-warp watch shows them.
+    It writes the study file and shows the command that you would type. Its runs
+    continue when it ends: dem-warp watch shows them.
     """
-    with clear_errors("Runs that were started go on: dem-warp watch DIR shows them."):
+    with clear_errors("Started runs continue: dem-warp watch DIR shows them."):
         from experiments.io.errors import InputError
-        from experiments.live.server import Place, open_browser, require_libraries, serve
+        from experiments.live.server import require_libraries, serve
 
         require_libraries()
-        from experiments.live.ui.start import ui_app
+        from experiments.live.ui.start_routes import ui_app
 
         chosen = (folder or Path()).absolute()
         if not chosen.is_dir():
-            raise InputError(str(folder), "must be a folder to work in", "no folder of this name")
-        place = Place.open(port)
+            raise InputError(str(folder), "no such folder")
         messages.print(f"Working in {chosen}. Open this address; Ctrl-C ends it:")
-        typer.echo(place.url)
-        if not no_browser:
-            open_browser(place.url)
-        serve(place, ui_app(chosen, place.token))
+        serve(port, not no_browser, lambda token: ui_app(chosen, token), typer.echo)

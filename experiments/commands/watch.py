@@ -29,18 +29,14 @@ def watch(
 
       ssh -L 8765:127.0.0.1:8765 THAT-MACHINE
 
-    then open the address that it told in a browser here.
+    then open the printed address in a browser here.
     """
-    with clear_errors("The run itself goes on, if it was running."):
+    with clear_errors("The run continues, if it was running."):
         from experiments.io.errors import InputError
-        from experiments.live.server import Place, open_browser, require_libraries, serve, watch_app
+        from experiments.live.server import require_libraries, serve, watch_app
 
         require_libraries()
         if not folder.is_dir():
-            raise InputError(str(folder), "must be the folder of a run", "no folder of this name")
-        place = Place.open(port)
+            raise InputError(str(folder), "no such folder")
         messages.print(f"Watching {folder}. Open this address; Ctrl-C ends it:")
-        typer.echo(place.url)
-        if not no_browser:
-            open_browser(place.url)
-        serve(place, watch_app(folder, place.token))
+        serve(port, not no_browser, lambda token: watch_app(folder, token), typer.echo)

@@ -1,1 +1,1 @@
-"""Pages in the browser: what runs tell of themselves while they work, and a page to start them from."""
+"""Pages in the browser: a page that watches a run, and a page to start runs."""

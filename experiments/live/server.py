@@ -1,4 +1,4 @@
-"""A small server on this machine alone: one page that watches a folder, or one to start from."""
+"""A small local server: a page that watches a folder, or a page to start runs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.io.errors import InputError
-from experiments.live.guard import Guard, new_token
+from experiments.live.access import TokenCheck, new_token
 
 if TYPE_CHECKING:
     import uvicorn
@@ -29,41 +29,35 @@ INSTALL = "pip install 'dem-warp[live]'"
 """Command that installs what the server needs."""
 
 LAST_LOOK = 2.5
-"""Time for which the page beside a run is served after its end, so that it sees it [s]."""
+"""Time for which the page of a run is served after its end, so that it shows the end [s]."""
 
 STOP_WITHIN = 5.0
 """Time that the server takes to end, at most [s]."""
 
 
 def require_libraries() -> None:
-    """Check that the libraries of the server are there.
-
-    Raises
-    ------
-    InputError
-        When one is missing, with the command that installs it.
-    """
+    """Check that the libraries of the server are there."""
     try:
         import starlette  # noqa: F401
         import uvicorn  # noqa: F401
     except ImportError as error:
-        rule = f"the page in the browser needs two small libraries: {INSTALL}"
+        rule = f"the page in the browser needs two more libraries: {INSTALL}"
         raise InputError("dem-warp", rule, f"no module {error.name}") from None
 
 
 def guarded(routes: Sequence[BaseRoute], token: str) -> ASGIApp:
-    """Build the application of some routes, which lets in only who knows the token."""
+    """Build the application of some routes, which only answers requests with the token."""
     from starlette.applications import Starlette
 
-    from experiments.live.watched import refused
+    from experiments.live.watch_routes import refused
 
     handlers: dict[Any, Any] = {InputError: refused}
-    return Guard(Starlette(routes=list(routes), exception_handlers=handlers), token)
+    return TokenCheck(Starlette(routes=list(routes), exception_handlers=handlers), token)
 
 
 def watch_app(folder: Path, token: str) -> ASGIApp:
     """Build the application that watches a folder."""
-    from experiments.live.watched import watch_routes
+    from experiments.live.watch_routes import watch_routes
 
     return guarded(watch_routes(lambda request: folder), token)
 
@@ -77,13 +71,7 @@ class Place:
 
     @classmethod
     def open(cls, port: int = 0) -> Place:
-        """Bind a port of this machine, any free one where it is 0.
-
-        Raises
-        ------
-        InputError
-            When the port is taken, or may not be used.
-        """
+        """Bind a port of this machine, any free one where it is 0."""
         found = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         if os.name == "posix":  # elsewhere it would let two servers share a port
             found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -107,9 +95,13 @@ class Place:
         return f"http://{ADDRESS}:{self.port}/{self.token}/"
 
 
-def serve(place: Place, app: ASGIApp) -> None:
-    """Answer until Ctrl-C."""
-    _server(app).run(sockets=[place.socket])
+def serve(port: int, browser: bool, app_of: Callable[[str], ASGIApp], say: Callable[[str], None]) -> None:
+    """Serve an application, which `app_of` makes for a token, until Ctrl-C; say its address."""
+    place = Place.open(port)
+    say(place.url)
+    if browser:
+        open_browser(place.url)
+    _server(app_of(place.token)).run(sockets=[place.socket])
 
 
 @contextmanager
@@ -159,13 +151,7 @@ def open_browser(url: str) -> None:
 
 @contextmanager
 def live_page(folder: Path, wanted: bool, say: Callable[[str], None]) -> Iterator[None]:
-    """Serve the page of a folder while the block runs, if it is wanted, and tell its address.
-
-    Raises
-    ------
-    InputError
-        When a library of the server is missing.
-    """
+    """Serve the page of a folder while the block runs, if it is wanted, and print its address."""
     if not wanted:
         yield
         return

@@ -119,8 +119,8 @@ def _kernels() -> Finding:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        return Finding("kernels' cache", False, f"{folder}: {error.strerror or error}", needed=True)
-    return Finding("kernels' cache", True, f"{folder}, {size:.0f} MB", needed=True)
+        return Finding("kernel cache", False, f"{folder}: {error.strerror or error}", needed=True)
+    return Finding("kernel cache", True, f"{folder}, {size:.0f} MB", needed=True)
 
 
 def _tried(name: str, what: Callable[[], str], needed: bool = False) -> Finding:

@@ -40,7 +40,7 @@ def work_of(case: Case[Any]) -> Work:
 
 
 def _duration(case: Case[Any], grains: int) -> float:
-    """Simulated time of a poured test [s]: its rain, and what its own phases expect beyond."""
+    """Return the simulated time of a poured test [s]: its rain and its own expected phases."""
     scene = case.scene
     if fixed := getattr(scene, "duration", None):
         return float(fixed)

@@ -151,7 +151,7 @@ async function measure() {
 
 // ---- study file --------------------------------------------------------------------------------------------
 
-function tellCheck(told) {
+function showCheck(told) {
   const doubts = [told.note, told.doubtful && `Doubtful: ${told.doubtful}`].filter(Boolean).join(" ");
   byId("draft-note").textContent = told.error ? "" : doubts || "The file keeps every rule.";
   show("draft-note", !told.error);
@@ -174,7 +174,7 @@ async function draft() {
     byId("draft-file").textContent = `${told.file}; you may change it here by hand`;
     byId("text").dataset.file = told.file;
   }
-  tellCheck(told);
+  showCheck(told);
 }
 
 const textAsked = () => ({ file: byId("text").dataset.file || `${value("name")}.toml`, text: byId("text").value });
@@ -257,7 +257,7 @@ async function refreshForm() {
   form = await ask("form");
   byId("folder").textContent = form.folder;
   options("study", form.studies);
-  options("measured", form.measured, "none: only the library waves");
+  options("measured", form.measured, "no file: only make the bank");
 }
 
 function choose() {
@@ -290,7 +290,7 @@ const onClick = (id, place, work) => byId(id).addEventListener("click", () => at
 onClick("preview", "clump-error", () => preview());
 onClick("measure", "angles-error", measure);
 onClick("draft", "draft-error", draft);
-onClick("check", "draft-error", async () => tellCheck(await ask("check", textAsked())));
+onClick("check", "draft-error", async () => showCheck(await ask("check", textAsked())));
 onClick("write", "draft-error", write);
 onClick("start", "run-error", start);
 byId("add-factor").addEventListener("click", () => addFactor());

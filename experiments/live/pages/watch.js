@@ -92,15 +92,15 @@ function newTile(heap) {
 
 function caption(tile) {
   const { heap } = tile;
-  let told = heap.at_rest ? "at rest" : `${tile.phase || "forming"}`;
-  if (!heap.at_rest && state.progress.state !== "running") told = `last seen: ${told}`;
-  if (!heap.at_rest && tile.fraction) told += `, ${Math.round(100 * tile.fraction)} %`;
-  if (typeof heap.angle === "number") told += `, ${heap.angle.toFixed(1)}°`;
-  else if (heap.at_rest) told += ", no angle";
-  const tagged = element("span", { class: heap.at_rest ? "tag rest" : "tag forming" }, told);
+  let shown = heap.at_rest ? "at rest" : `${tile.phase || "forming"}`;
+  if (!heap.at_rest && state.progress.state !== "running") shown = `last seen: ${shown}`;
+  if (!heap.at_rest && tile.fraction) shown += `, ${Math.round(100 * tile.fraction)} %`;
+  if (typeof heap.angle === "number") shown += `, ${heap.angle.toFixed(1)}°`;
+  else if (heap.at_rest) shown += ", no angle";
+  const tagged = element("span", { class: heap.at_rest ? "tag rest" : "tag forming" }, shown);
   tile.words.replaceChildren(tagged, element("br"), heap.title);
   tile.words.title = heap.reason || "";
-  tile.canvas.setAttribute("aria-label", `Heap of ${heap.title}: ${told}. Arrow keys turn it.`);
+  tile.canvas.setAttribute("aria-label", `Heap of ${heap.title}: ${shown}. Arrow keys turn it.`);
 }
 
 async function refreshHeaps() {
@@ -155,8 +155,8 @@ function renderStages() {
 
 function renderCases() {
   const { columns, rows, ended, planned } = state.cases;
-  const told = rows.length < ended ? `, the last ${rows.length} are shown` : "";
-  byId("cases-note").textContent = ended ? `${ended} of ${planned} planned cases have ended${told}.`
+  const shown = rows.length < ended ? `, the last ${rows.length} are shown` : "";
+  byId("cases-note").textContent = ended ? `${ended} of ${planned} planned cases have ended${shown}.`
     : planned ? `${planned} cases are planned, none has ended yet.` : "No case has ended yet.";
   const old = byId("cases").firstElementChild;
   const [down, across] = old ? [old.scrollTop, old.scrollLeft] : [0, 0];

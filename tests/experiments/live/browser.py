@@ -26,7 +26,7 @@ WORDS = (
 class Browser:
     """One page of a browser; notes its errors and the addresses that it asks for."""
 
-    def __init__(self, profile: Path, width: int = 1280, dark: bool = False) -> None:
+    def __init__(self, profile: Path) -> None:
         commands, self._commands = os.pipe()
         self._answers, answers = os.pipe()
         shell = f'exec "$@" 3<&{commands} 4>&{answers}'
@@ -47,6 +47,9 @@ class Browser:
         self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network", "DOM"):
             self.call(f"{domain}.enable")
+
+    def look(self, width: int = 1280, dark: bool = False) -> None:
+        """Show pages with a width, light or dark."""
         size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
         self.call("Emulation.setDeviceMetricsOverride", **size)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -144,11 +147,10 @@ class Browser:
 
 
 @contextmanager
-def browsing(profile: Path, url: str, width: int = 1280, dark: bool = False) -> Iterator[Browser]:
-    """Open a page in a browser of its own."""
-    browser = Browser(profile, width, dark)
-    try:
-        browser.open(url)
-        yield browser
-    finally:
-        browser.close()
+def browsing(browser: Browser, url: str, width: int = 1280, dark: bool = False) -> Iterator[Browser]:
+    """Open a page, and leave it at the end."""
+    browser.look(width, dark)
+    browser.errors, browser.asked = [], []
+    browser.open(url)
+    yield browser
+    browser.call("Page.navigate", url="about:blank")

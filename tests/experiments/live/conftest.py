@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +17,8 @@ from experiments.live.server import Place, serving, watch_app
 from experiments.studyfile import Study
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+from browser import Browser
 
 NAME, KEY, OTHER = "a" * 64, "b" * 64, "c" * 64
 """Name of a case that runs; keys of two cases that have been planned."""
@@ -64,3 +66,11 @@ def served() -> Callable[[Path], Place]:
 
     yield serve  # type: ignore[misc]
     stack.close()
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Start one browser for all tests of pages."""
+    browser = Browser(tmp_path_factory.mktemp("profile"))
+    yield browser
+    browser.close()

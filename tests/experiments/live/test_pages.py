@@ -18,7 +18,7 @@ from experiments import api
 from experiments.cases import Store
 from experiments.live import server
 from experiments.live.server import Place, serving
-from experiments.live.ui.start import ui_app
+from experiments.live.ui.start_routes import ui_app
 from experiments.studyfile import Study, load_study
 
 pytestmark = pytest.mark.program("chromium")
@@ -75,15 +75,8 @@ def check(browser: Browser, place: Place) -> None:
 LOOKS = [(1280, False), (1280, True), (390, False), (390, True)]
 
 
-@pytest.mark.parametrize(("width", "dark"), LOOKS)
 def test_a_run_is_shown_as_it_goes(
-    run_folder: Path,
-    small_study: Study,
-    cone: Cone,
-    served: Serve,
-    tmp_path: Path,
-    width: int,
-    dark: bool,
+    run_folder: Path, small_study: Study, cone: Cone, served: Serve, chromium: Browser
 ) -> None:
     journal = begin(run_folder, small_study, cone)
     place = served(run_folder)
@@ -92,7 +85,7 @@ def test_a_run_is_shown_as_it_goes(
         note(Progress(0, 2, 0.0, {"lift": 1}, 0.0))
         journal._noted = 0.0
         note(Progress(1, 2, 0.5, {"lift": 1}, 30.0))
-        browser = stack.enter_context(browsing(tmp_path / "profile", place.url, width, dark))
+        browser = stack.enter_context(browsing(chromium, place.url))
         browser.wait(f"{PAINTED} === 2")
         shown = browser.run("document.body.innerText")
         assert "30 s left, 50 %, 1 of 2 cases, 1 lift" in shown
@@ -102,9 +95,11 @@ def test_a_run_is_shown_as_it_goes(
         assert "The run begins." in shown
         assert browser.run("document.querySelector('#state').textContent") == "running"
         browser.wait("document.querySelector('.chart .scatterlayer .point')")
-        dark_page = "getComputedStyle(document.body).backgroundColor === 'rgb(18, 22, 28)'"
-        assert browser.run(dark_page) is dark
-        check(browser, place)
+        for width, dark in LOOKS:
+            browser.look(width, dark)
+            dark_page = "getComputedStyle(document.body).backgroundColor === 'rgb(18, 22, 28)'"
+            browser.wait(f"({dark_page}) === {str(dark).lower()}")
+            check(browser, place)
         # what happens is seen without loading the page anew
         Store(run_folder / "cases").save(OTHER, cone(0.6))
         journal.ended(OTHER, {"status": "finished", "reason": "", "angle": 31.25, "angle_se": 0.5})
@@ -118,7 +113,7 @@ def test_a_run_is_shown_as_it_goes(
 
 @pytest.mark.parametrize("ending", ["killed", "failed"])
 def test_a_run_that_was_broken_off_is_shown(
-    run_folder: Path, small_study: Study, cone: Cone, served: Serve, tmp_path: Path, ending: str,
+    run_folder: Path, small_study: Study, cone: Cone, served: Serve, chromium: Browser, ending: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     journal = begin(run_folder, small_study, cone)
@@ -126,9 +121,9 @@ def test_a_run_that_was_broken_off_is_shown(
         journal.__exit__(ValueError, ValueError("the disk is full"), None)
     else:
         journal._ended.set()
-        monkeypatch.setattr("experiments.live.state.STALE", -1.0)
+        monkeypatch.setattr("experiments.live.run_state.STALE", -1.0)
     place = served(run_folder)
-    with browsing(tmp_path / "profile", place.url) as browser:
+    with browsing(chromium, place.url) as browser:
         browser.wait(f"{PAINTED} === 2")
         shown = browser.run("document.body.innerText")
         assert "last seen: lift, 40 %" in shown
@@ -137,7 +132,7 @@ def test_a_run_that_was_broken_off_is_shown(
 
 
 def test_a_finished_calibration_is_shown_with_its_report(
-    small_text: str, tmp_path: Path, served: Serve
+    small_text: str, tmp_path: Path, served: Serve, chromium: Browser
 ) -> None:
     """A real run, from the command's own function, with its stages, tables and report."""
     study = tmp_path / "small.toml"
@@ -146,7 +141,7 @@ def test_a_finished_calibration_is_shown_with_its_report(
     found = api.calibrate(study, folder, device="cpu").campaign
     assert found is not None
     place = served(folder)
-    with browsing(tmp_path / "profile", place.url) as browser:
+    with browsing(chromium, place.url) as browser:
         browser.wait(f"{PAINTED} === 12")
         for decision in found.decisions:
             assert decision.outcome in browser.run("document.querySelector('#stages').innerText")
@@ -158,22 +153,22 @@ def test_a_finished_calibration_is_shown_with_its_report(
             "Math.abs(chart.clientWidth - chart.querySelector('svg').clientWidth) < 2)"
         )
         check(browser, place)
-    with browsing(tmp_path / "again", f"{place.url}file/report.html") as browser:
+    with browsing(chromium, f"{place.url}file/report.html") as browser:
         browser.wait("document.querySelector('h1')")
         assert browser.errors == []
 
 
-def test_the_page_beside_a_run_sees_its_end(
-    run_folder: Path, small_study: Study, cone: Cone, tmp_path: Path
+def test_the_page_of_a_run_shows_its_end(
+    run_folder: Path, small_study: Study, cone: Cone, chromium: Browser
 ) -> None:
     """`--live` serves a moment longer than the run lasts."""
-    told: list[str] = []
+    said: list[str] = []
     with ExitStack() as stack:
-        live = stack.enter_context(server.live_page(run_folder, True, told.append))
+        live = stack.enter_context(server.live_page(run_folder, True, said.append))
         assert live is None
         journal = begin(run_folder, small_study, cone)
-        [line] = told
-        browser = stack.enter_context(browsing(tmp_path / "profile", line.removeprefix("Live: ")))
+        [line] = said
+        browser = stack.enter_context(browsing(chromium, line.removeprefix("Live: ")))
         browser.wait("document.querySelector('#state').textContent === 'running'")
         journal.__exit__(None, None, None)
         browser.wait("document.querySelector('#state').textContent === 'finished'")
@@ -181,10 +176,10 @@ def test_the_page_beside_a_run_sees_its_end(
 
 
 def test_a_heap_turns_by_the_arrow_keys(
-    run_folder: Path, small_study: Study, cone: Cone, served: Serve, tmp_path: Path
+    run_folder: Path, small_study: Study, cone: Cone, served: Serve, chromium: Browser
 ) -> None:
     begin(run_folder, small_study, cone)
-    with browsing(tmp_path / "profile", served(run_folder).url) as browser:
+    with browsing(chromium, served(run_folder).url) as browser:
         browser.wait(f"{PAINTED} === 2")
         picture = "document.querySelector('canvas').toDataURL()"
         before = browser.run(picture)
@@ -196,7 +191,7 @@ def test_a_heap_turns_by_the_arrow_keys(
 
 
 @pytest.fixture
-def workshop(tmp_path: Path):  # type: ignore[no-untyped-def]
+def start_page(tmp_path: Path):  # type: ignore[no-untyped-def]
     """Serve the page to start from: its place, and its folder."""
     folder = tmp_path / "work"
     folder.mkdir()
@@ -208,23 +203,24 @@ def workshop(tmp_path: Path):  # type: ignore[no-untyped-def]
 READY = "document.documentElement.dataset.ready"
 
 
-@pytest.mark.parametrize(("width", "dark"), LOOKS)
-def test_the_page_to_start_from_stands(
-    workshop: tuple[Place, Path], tmp_path: Path, width: int, dark: bool
-) -> None:
-    place, _ = workshop
-    with browsing(tmp_path / "profile", place.url, width, dark) as browser:
+def test_the_start_page_is_readable_and_fits(start_page: tuple[Place, Path], chromium: Browser) -> None:
+    place, _ = start_page
+    with browsing(chromium, place.url) as browser:
         browser.wait(READY)
-        check(browser, place)
+        for width, dark in LOOKS:
+            browser.look(width, dark)
+            check(browser, place)
 
 
 @pytest.mark.usefixtures("_coarse_clumps")
-def test_from_an_stl_to_a_heap_in_the_browser(workshop: tuple[Place, Path], tmp_path: Path) -> None:
+def test_from_an_stl_to_a_heap_in_the_browser(
+    start_page: tuple[Place, Path], chromium: Browser, tmp_path: Path
+) -> None:
     """Grain from an STL with its preview, test, ranges, study file, start, watch: by clicks alone."""
-    place, folder = workshop
+    place, folder = start_page
     stl = tmp_path / "grain.stl"
     trimesh.creation.capsule(height=2.0, radius=1.5, count=(16, 16)).export(stl)
-    with browsing(tmp_path / "profile", place.url) as browser:
+    with browsing(chromium, place.url) as browser:
         browser.wait(READY)
         browser.fill("#name", "rye")
         browser.click("input[value=file]")
@@ -266,8 +262,10 @@ def test_from_an_stl_to_a_heap_in_the_browser(workshop: tuple[Place, Path], tmp_
     assert (folder / "out" / "rye-heap-1" / "heap.vtp").is_file()
 
 
-def test_photographs_become_the_target(workshop: tuple[Place, Path], tmp_path: Path) -> None:
-    place, folder = workshop
+def test_photographs_become_the_target(
+    start_page: tuple[Place, Path], chromium: Browser, tmp_path: Path
+) -> None:
+    place, folder = start_page
     pictures = [tmp_path / f"{number}.png" for number in range(3)]
     for path, slope in zip(pictures, (0.5, 0.55, 0.6), strict=True):
         picture = np.full((300, 600), 230, np.uint8)
@@ -275,7 +273,7 @@ def test_photographs_become_the_target(workshop: tuple[Place, Path], tmp_path: P
         cv2.fillPoly(picture, [corners], 40)
         picture[250:] = 120
         cv2.imwrite(str(path), picture)
-    with browsing(tmp_path / "profile", place.url) as browser:
+    with browsing(chromium, place.url) as browser:
         browser.wait(READY)
         browser.click("input[value=pictures]")
         browser.choose_files("#photos", *pictures)

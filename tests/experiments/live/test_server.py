@@ -9,6 +9,7 @@ import sys
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -42,26 +43,27 @@ def test_the_page_and_all_that_it_loads_come_with_the_token(client: TestClient) 
         assert client.get(f"/{TOKEN}/{name}").status_code == 200, name
 
 
-@pytest.mark.parametrize(
-    "path", ["/", "/state.json", "/wrong/state.json", f"/{TOKEN}x/", f"/{TOKEN[:-1]}/", "//", f"//{TOKEN}/"]
-)
-def test_without_the_token_nothing_is_told(client: TestClient, path: str) -> None:
-    answer = client.get(HOST + path)
-    assert answer.status_code == 403
-    assert "Small" not in answer.text
+def test_without_the_token_every_request_is_refused(client: TestClient) -> None:
+    for path in (
+        "/",
+        "/state.json",
+        "/wrong/state.json",
+        f"/{TOKEN}x/",
+        f"/{TOKEN[:-1]}/",
+        "//",
+        f"//{TOKEN}/",
+    ):
+        answer = client.get(HOST + path)
+        assert answer.status_code == 403
+        assert "Small" not in answer.text
 
 
-@pytest.mark.parametrize(
-    "host", ["evil.example", "127.0.0.1.evil.example:8765", "[::1]:8765", "0.0.0.0:8765", ""]
-)
-def test_a_page_of_another_name_is_refused(client: TestClient, host: str) -> None:
-    """DNS rebinding: a name of someone else's that leads to this address."""
-    assert client.get(f"/{TOKEN}/state.json", headers={"Host": host}).status_code == 403
-
-
-@pytest.mark.parametrize("host", ["127.0.0.1:1", "localhost:8765", "localhost"])
-def test_a_tunnel_may_have_another_port(client: TestClient, host: str) -> None:
-    assert client.get(f"/{TOKEN}/state.json", headers={"Host": host}).status_code == 200
+def test_a_page_of_another_name_is_refused_and_a_tunnel_may_have_another_port(client: TestClient) -> None:
+    """Refuse DNS rebinding: another site's name that leads to this address."""
+    others = ("evil.example", "127.0.0.1.evil.example:8765", "[::1]:8765", "0.0.0.0:8765", "")
+    for host in (*others, "127.0.0.1:1", "localhost:8765", "localhost"):
+        status = client.get(f"/{TOKEN}/state.json", headers={"Host": host}).status_code
+        assert status == (403 if host in others else 200), host
 
 
 def test_another_sites_request_is_refused(client: TestClient) -> None:
@@ -78,7 +80,7 @@ def test_a_page_loads_nothing_from_elsewhere(client: TestClient) -> None:
     assert "sandbox" in client.get(f"/{TOKEN}/file/report.html").headers["content-security-policy"]
 
 
-def test_the_state_tells_what_the_run_does(client: TestClient) -> None:
+def test_the_state_describes_the_run(client: TestClient) -> None:
     state = client.get(f"/{TOKEN}/state.json").json()
     assert state["run"] == {"command": "calibrate", "study": "Small", "scale": None, "device": "cpu"}
     assert state["progress"]["state"] == "running"
@@ -103,11 +105,16 @@ def test_heaps_come_as_their_spheres(client: TestClient, cone: Callable[..., Cas
     assert client.get(f"/{TOKEN}/heap/preview/{NAME}").headers["x-phase"] == "lift"
 
 
-@pytest.mark.parametrize(
-    "name", [f"case/{OTHER}", "case/../study", "preview/x", "other/" + KEY, "%2e%2e/secret", f"case/{KEY}%00"]
-)
-def test_a_heap_that_is_not_there_is_no_error(client: TestClient, name: str) -> None:
-    assert client.get(f"/{TOKEN}/heap/{name}").status_code == 204
+def test_a_missing_heap_is_no_error(client: TestClient) -> None:
+    for name in (
+        f"case/{OTHER}",
+        "case/../study",
+        "preview/x",
+        "other/" + KEY,
+        "%2e%2e/secret",
+        f"case/{KEY}%00",
+    ):
+        assert client.get(f"/{TOKEN}/heap/{name}").status_code == 204
 
 
 def test_files_of_the_run_can_be_opened(client: TestClient) -> None:
@@ -164,7 +171,7 @@ def _taken() -> int:
 _open: list[socket.socket] = []
 
 
-def test_a_missing_library_is_told_with_the_command_that_installs_it(
+def test_a_missing_library_is_reported_with_the_command_that_installs_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "uvicorn", None)
@@ -173,32 +180,34 @@ def test_a_missing_library_is_told_with_the_command_that_installs_it(
         ("ui", tmp_path),
         ("heap", "--scale", "bench", "--live", "--out", tmp_path / "h"),
     ):
-        code, _, told = dem_warp(*words)
+        code, _, shown = dem_warp(*words)
         assert code == 2
-        assert "pip install 'dem-warp[live]'" in told
+        assert "pip install 'dem-warp[live]'" in shown
     assert not (tmp_path / "h").exists()
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
     for command in ("watch", "ui"):
-        code, _, told = dem_warp(command, tmp_path / "none")
+        code, _, shown = dem_warp(command, tmp_path / "none")
         assert code == 2
-        assert "no folder of this name" in told
+        assert "no such folder" in shown
 
 
-def test_the_address_is_told_and_no_browser_opened_without_a_screen(
+def test_the_address_is_reported_and_no_browser_opened_without_a_screen(
     monkeypatch: pytest.MonkeyPatch, run_folder: Path
 ) -> None:
     run_folder.mkdir(parents=True)
     opened: list[str] = []
-    monkeypatch.setattr(server, "serve", lambda place, app: place.socket.close())
+    monkeypatch.setattr(
+        server, "_server", lambda app: SimpleNamespace(run=lambda sockets: sockets[0].close())
+    )
     monkeypatch.setattr(server.webbrowser, "open", opened.append)
     monkeypatch.setattr(sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    code, told, _ = dem_warp("watch", run_folder)
+    code, shown, _ = dem_warp("watch", run_folder)
     assert code == 0
-    assert told.startswith("http://127.0.0.1:")
+    assert shown.startswith("http://127.0.0.1:")
     assert opened == []
     monkeypatch.setenv("DISPLAY", ":0")
     dem_warp("watch", run_folder)
@@ -207,12 +216,8 @@ def test_the_address_is_told_and_no_browser_opened_without_a_screen(
     assert len(opened) == 1
 
 
-def test_json_of_the_state_has_no_nan(client: TestClient) -> None:
-    json.loads(client.get(f"/{TOKEN}/state.json").text, parse_constant=lambda name: pytest.fail(name))
-
-
 @pytest.mark.parametrize("command", ["calibrate", "discover", "heap"])
-def test_live_serves_the_page_beside_the_run(
+def test_live_serves_the_page_of_the_run(
     command: str, small_study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     places: list[Place] = []
@@ -224,7 +229,7 @@ def test_live_serves_the_page_beside_the_run(
         urls.append(places[0].url)
         with urllib.request.urlopen(urls[0] + "state.json") as answer:
             seen.append(answer.read())
-        raise InputError(command, "expected the run has looked", "enough")
+        raise InputError(command, "the run has looked")
 
     monkeypatch.setattr(server.Place, "open", lambda port=0: places.append(opened(port)) or places[-1])
     monkeypatch.setattr(server, "can_open_browser", lambda: False)
@@ -232,10 +237,10 @@ def test_live_serves_the_page_beside_the_run(
     monkeypatch.setattr(api, "discover", run)
     monkeypatch.setattr(cases, "simulate_heap", run)
     words = [command, small_study.file, "--device", "cpu", "--live", "--out", tmp_path / "out"]
-    code, _, told = dem_warp(*words)
+    code, _, shown = dem_warp(*words)
     assert code == 2
-    assert "the run has looked" in told
-    assert f"Live: {urls[0]}" in told
+    assert "the run has looked" in shown
+    assert f"Live: {urls[0]}" in shown
     assert json.loads(seen[0])["progress"]["state"] == ("running" if command == "heap" else "waiting")
     with pytest.raises(OSError, match="refused"):
         urllib.request.urlopen(urls[0])

@@ -18,9 +18,9 @@ from experiments.cases import Store, open_folder
 from experiments.cases.store.folder import is_used
 from experiments.io.files import JOURNAL
 from experiments.journal.journal import BEAT, CASES, PROGRESS, Journal
-from experiments.live.charts import charts_of
-from experiments.live.state import RunState
-from experiments.live.watched import state_text
+from experiments.live.run_charts import charts_of
+from experiments.live.run_state import RunState
+from experiments.live.watch_routes import state_text
 from experiments.studyfile import Study
 
 Cone = Callable[..., CaseResult]
@@ -42,19 +42,19 @@ def test_a_run_that_ends_is_finished(run_folder: Path, small_study: Study) -> No
 
 
 @pytest.mark.parametrize(
-    ("error", "state", "told"),
+    ("error", "state", "said"),
     [
         (KeyboardInterrupt(), "interrupted", "The run was interrupted."),
         (ValueError("no heap"), "failed", "The run failed: no heap"),
     ],
 )
 def test_a_run_that_is_broken_off_says_so(
-    run_folder: Path, small_study: Study, error: BaseException, state: str, told: str
+    run_folder: Path, small_study: Study, error: BaseException, state: str, said: str
 ) -> None:
     with pytest.raises(type(error)), Journal(run_folder, "calibrate", small_study):
         raise error
     found = RunState.read(run_folder).progress
-    assert (found.state, found.message) == (state, told)
+    assert (found.state, found.message) == (state, said)
 
 
 def test_a_killed_run_is_interrupted(run_folder: Path, small_study: Study, cone: Cone) -> None:
@@ -117,7 +117,7 @@ def test_folders_of_older_versions_show_what_they_hold(
 @pytest.mark.parametrize(
     "content", [b"", b"status\n\xff\n", b'a,"', b"status,angle\nfinished,nan,3\n", b"\0\n\0"]
 )
-def test_a_damaged_table_of_an_older_version_is_passed_over(tmp_path: Path, content: bytes) -> None:
+def test_a_damaged_table_of_an_older_version_is_ignored(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "tables").mkdir()
     for name in ("cases.csv", "decisions.csv"):
         (tmp_path / "tables" / name).write_bytes(content)
@@ -126,7 +126,7 @@ def test_a_damaged_table_of_an_older_version_is_passed_over(tmp_path: Path, cont
     assert all(case.get("angle") is None for case in state.cases.values())
 
 
-def test_progress_tells_the_time_left(run_folder: Path, small_study: Study) -> None:
+def test_progress_has_the_time_left(run_folder: Path, small_study: Study) -> None:
     with Journal(run_folder, "calibrate", small_study) as journal:
         with journal.batch("screening") as note:
             note(Progress(0, 4, 0.0, {"fill": 2}, 0.0))
@@ -138,13 +138,13 @@ def test_progress_tells_the_time_left(run_folder: Path, small_study: Study) -> N
         assert RunState.read(run_folder).left == ""
 
 
-def test_warnings_of_a_run_stand_in_its_log(run_folder: Path, small_study: Study) -> None:
+def test_warnings_of_a_run_are_in_its_log(run_folder: Path, small_study: Study) -> None:
     with Journal(run_folder, "calibrate", small_study):
         logging.getLogger("experiments.runs").warning("a %s is doubtful", "picture")
     logging.getLogger("experiments.runs").warning("after the end")
-    told = [(line.level, line.text) for line in RunState.read(run_folder).log]
-    assert ("warning", "a picture is doubtful") in told
-    assert "after the end" not in [text for _, text in told]
+    said = [(line.level, line.text) for line in RunState.read(run_folder).log]
+    assert ("warning", "a picture is doubtful") in said
+    assert "after the end" not in [text for _, text in said]
 
 
 def test_a_journal_is_no_result(run_folder: Path, small_study: Study) -> None:
@@ -170,7 +170,7 @@ def test_a_journal_that_cannot_be_written_ends_no_run(tmp_path: Path, small_stud
     assert RunState.read(tmp_path).log == []
 
 
-def test_damaged_notes_are_passed_over(run_folder: Path, small_study: Study, cone: Cone) -> None:
+def test_damaged_notes_are_ignored(run_folder: Path, small_study: Study, cone: Cone) -> None:
     begin(run_folder, small_study, cone)
     for name in ("run.json", "stages.jsonl", "log.jsonl", PROGRESS, CASES):
         path = run_folder / JOURNAL / name

@@ -155,7 +155,7 @@ def test_the_doctor_tells_what_there_is(monkeypatch: pytest.MonkeyPatch) -> None
     code, out, err = dem_warp("doctor", "--device", "cpu", "--workers", 2, "--json")
     assert code == 0, err
     found = {finding["name"]: finding for finding in json.loads(out)}
-    for name in ("versions", "cores", "memory", "kernels' cache", "simulation", "OpenGL", "clusters"):
+    for name in ("versions", "cores", "memory", "kernel cache", "simulation", "OpenGL", "clusters"):
         assert name in found
     assert found["simulation"]["good"]
     assert found["will be used"]["text"].startswith("cpu, 2 at once")
@@ -169,7 +169,7 @@ def test_the_doctors_exit_code_tells_that_nothing_can_be_simulated(
     monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path / "file" / "cache"))
     code, out, _ = dem_warp("doctor", "--device", "cpu")
     assert code == 1
-    assert "FAIL kernels' cache" in out
+    assert "FAIL kernel cache" in out
 
 
 def test_a_device_that_is_not_there_ends_with_2() -> None:

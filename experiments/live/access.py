@@ -1,4 +1,4 @@
-"""The guard of a local server: only who knows its token, from a page of its own, is answered."""
+"""Access to a local server: only requests with its token, from its own pages, are answered."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ HEADERS = {
 
 
 def new_token() -> str:
-    """Draw a token that nobody guesses."""
+    """Return a new random token."""
     return secrets.token_urlsafe(24)
 
 
-class Guard:
+class TokenCheck:
     """Lets requests through whose host is this machine and whose path begins with the token.
 
-    Any other is answered by 403, with nothing that tells why. The token is compared in constant time.
+    Any other is answered by 403, without a reason. The token is compared in constant time.
     """
 
     def __init__(self, app: ASGIApp, token: str) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,9 @@ import numpy as np
 from doe.plots.palette import BLUE, SERIES, VERMILION
 from experiments.calibrate.results import STAGES
 from experiments.io.errors import InputError
-from experiments.live.folder import inside
-from experiments.live.notes import ResponseNote, SampleNote
-from experiments.live.state import RunState
+from experiments.live.journal_notes import ResponseNote, SampleNote
+from experiments.live.run_files import inside
+from experiments.live.run_state import RunState
 from experiments.report.kit.chart import Chart, add_bars, add_line, add_points, add_target, new_figure
 from experiments.studyfile.observables import ANGLE, OBSERVABLES
 
@@ -27,62 +27,70 @@ LAST_OUTCOMES = 5_000
 
 
 def charts_of(state: RunState) -> list[Chart]:
-    """Draw what has come so far; a chart without data is left out."""
-    observable, title, target = _leading(state)
-    rows = [case for case in state.cases.values() if _is_number(case.get(observable))]
+    """Draw the results so far; a chart without data is left out."""
+    leading = _Leading.of(state)
     drawn = [
-        _course(rows, observable, title, target),
-        _climb(rows, observable, title, target),
+        _course(leading),
+        _climb(leading),
         _effects(state),
-        *_over_factors(state, rows, observable, title, target),
+        *_over_factors(state, leading),
         _outcomes(state.folder),
     ]
     return [chart for chart in drawn if chart is not None]
 
 
-def _leading(state: RunState) -> tuple[str, str, SampleNote | None]:
-    """Column of the leading response, its axis title, and its target."""
-    told = state.run.responses
-    first = told[0] if told else ResponseNote(name="angle", observable=ANGLE, unit="deg")
-    settled = [sample for stage in state.stages for sample in stage.responses.values()]
-    title = f"{first.name}{'' if first.unit == '1' else f' [{first.unit}]'}".replace("_", " ")
-    return first.observable, title, next(iter(settled), first.measured)
+@dataclass(frozen=True)
+class _Leading:
+    """The leading response: its column, axis title, target, and the cases that have it."""
+
+    observable: str
+    title: str
+    target: SampleNote | None
+    rows: list[dict[str, Any]]
+
+    @classmethod
+    def of(cls, state: RunState) -> _Leading:
+        noted = state.run.responses
+        first = noted[0] if noted else ResponseNote(name="angle", observable=ANGLE, unit="deg")
+        settled = [sample for stage in state.stages for sample in stage.responses.values()]
+        title = f"{first.name}{'' if first.unit == '1' else f' [{first.unit}]'}".replace("_", " ")
+        rows = [case for case in state.cases.values() if _is_number(case.get(first.observable))]
+        return cls(first.observable, title, next(iter(settled), first.measured), rows)
+
+    def figure(self, x: str, legend: bool = True) -> Any:
+        """Return an empty figure of the response with its target."""
+        figure = new_figure(x, self.title, legend=legend)
+        if self.target:
+            add_target(figure, self.target.mean, self.target.sd)
+        return figure
 
 
-def _course(
-    rows: Sequence[dict[str, Any]], observable: str, title: str, target: SampleNote | None
-) -> Chart | None:
+def _course(leading: _Leading) -> Chart | None:
     """Draw the response of every case in the order in which they ended."""
-    if not rows:
+    if not leading.rows:
         return None
-    figure = new_figure("case, in the order of their ends", title)
-    if target:
-        add_target(figure, target.mean, target.sd)
-    numbered = list(enumerate(rows, start=1))
+    figure = leading.figure("case, in the order of their ends")
+    numbered = list(enumerate(leading.rows, start=1))
     for stage in [*STAGES, None]:
         some = [(number, row) for number, row in numbered if row.get("stage") == stage]
         if some:
             name = str(stage or "case").replace("_", " ")
             color = SERIES[STAGES.index(stage) % len(SERIES)] if stage else BLUE
-            x, y = [number for number, _ in some], [row[observable] for _, row in some]
+            x, y = [number for number, _ in some], [row[leading.observable] for _, row in some]
             add_points(figure, x, y, name, color)
-    band = "; the green band is the target ± 1 sd" if target else ""
+    band = "; the green band is the target ± 1 sd" if leading.target else ""
     return Chart("course", f"Every case that has ended{band}.", figure)
 
 
-def _climb(
-    rows: Sequence[dict[str, Any]], observable: str, title: str, target: SampleNote | None
-) -> Chart | None:
+def _climb(leading: _Leading) -> Chart | None:
     """Draw the response along the climb."""
     steps: dict[int, list[float]] = {}
-    for row in rows:
+    for row in leading.rows:
         if row.get("stage") == "climb" and isinstance(row.get("run"), int):
-            steps.setdefault(row["run"], []).append(row[observable])
+            steps.setdefault(row["run"], []).append(row[leading.observable])
     if not steps:
         return None
-    figure = new_figure("step of the climb", title)
-    if target:
-        add_target(figure, target.mean, target.sd)
+    figure = leading.figure("step of the climb")
     ordered = sorted(steps)
     each = [step for step in ordered for _ in steps[step]]
     values = [value for step in ordered for value in steps[step]]
@@ -110,23 +118,15 @@ def _effects(state: RunState) -> Chart | None:
     return Chart("effects", "Change of the response from the low to the high end of each factor.", figure)
 
 
-def _over_factors(
-    state: RunState,
-    rows: Sequence[dict[str, Any]],
-    observable: str,
-    title: str,
-    target: SampleNote | None,
-) -> list[Chart]:
+def _over_factors(state: RunState, leading: _Leading) -> list[Chart]:
     """Draw the response over each factor that varies."""
     charts: list[Chart] = []
     for name, unit in ((factor.name, factor.unit) for factor in state.run.factors):
-        some = [row for row in rows if _is_number(row.get(name))]
+        some = [row for row in leading.rows if _is_number(row.get(name))]
         if len({row[name] for row in some}) < 2 or len(charts) == MOST_FACTORS:
             continue
-        figure = new_figure(name if unit in ("1", "") else f"{name} [{unit}]", title, legend=False)
-        if target:
-            add_target(figure, target.mean, target.sd)
-        x, y = [row[name] for row in some], [row[observable] for row in some]
+        figure = leading.figure(name if unit in ("1", "") else f"{name} [{unit}]", legend=False)
+        x, y = [row[name] for row in some], [row[leading.observable] for row in some]
         add_points(figure, x, y, "case", BLUE, size=7)
         charts.append(Chart(f"over-{name}", f"Every case over {name}.", figure, "low"))
     return charts
@@ -144,7 +144,7 @@ def _outcomes(folder: Path) -> Chart | None:
 
 
 def search_values(folder: Path) -> np.ndarray:
-    """First observable of the last outcomes of a search; empty where there are none to be read."""
+    """Return the first observable of the last outcomes of a search; empty if there are none."""
     try:
         path = inside(folder, "outcomes.sqlite")
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=1.0)) as file:

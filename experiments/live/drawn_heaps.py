@@ -12,7 +12,7 @@ from experiments.io.errors import InputError
 from experiments.io.files import JOURNAL
 from experiments.journal.journal import PREVIEWS
 from experiments.journal.previews import read_preview, spheres_of
-from experiments.live.folder import inside
+from experiments.live.run_files import inside
 
 MOST_SPHERES = 60_000
 """Spheres of a heap that are drawn; of more, whole grains are left out evenly."""
@@ -21,20 +21,7 @@ _NAME = re.compile(r"[0-9a-f]{64}")
 
 
 def heap_spheres(folder: Path, name: str) -> tuple[np.ndarray, str, float]:
-    """Read the spheres of a heap, see `spheres_of`, its phase and how much of it is done.
-
-    Parameters
-    ----------
-    folder
-        Folder of the run.
-    name
-        Id of the heap, as `RunState.heaps` has it.
-
-    Raises
-    ------
-    InputError
-        When there is no such heap, or its file is damaged.
-    """
+    """Read the spheres of a heap, see `spheres_of`, its phase and how much of it is done."""
     kind, _, key = name.partition("/")
     if name == "heap":
         return _few(_heap_file(inside(folder, "heap.vtp"))), "finished", 1.0
@@ -64,6 +51,6 @@ def _heap_file(path: Path) -> np.ndarray:
 
 
 def _few(spheres: np.ndarray) -> np.ndarray:
-    """Leave out whole grains, evenly, until no more spheres are left than are drawn."""
+    """Leave out whole grains evenly, so that at most `MOST_SPHERES` are left."""
     step = -(-len(spheres) // MOST_SPHERES)
     return spheres[spheres[:, 4].astype(int) % step == 0] if step > 1 else spheres

@@ -1,4 +1,4 @@
-"""The state of a run, as its folder tells it: waiting, running, finished, failed or interrupted."""
+"""The state of a run, read from its folder: waiting, running, finished, failed or interrupted."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from experiments.cases.store.folder import CASES as STORE
 from experiments.io.files import JOURNAL
 from experiments.io.time_left import duration
 from experiments.journal.journal import BEAT, CASES, LOG, PREVIEWS, PROGRESS, RUN, STAGES
-from experiments.live.folder import changed, inside, matching, read_json, read_lines, read_table
-from experiments.live.notes import (
+from experiments.live.journal_notes import (
     DecisionNote,
     LogNote,
     ProgressNote,
@@ -24,6 +23,7 @@ from experiments.live.notes import (
     noted,
     values_of,
 )
+from experiments.live.run_files import changed, inside, matching, read_json, read_lines, read_table
 
 STALE = 15.0
 """Time without a sign of life after which a run counts as killed [s]."""
@@ -37,7 +37,7 @@ OUTPUTS = ("report.html", "record/record.html", "snapshot.png", "material.toml",
 
 @dataclass(frozen=True)
 class RunState:
-    """Everything that a folder tells of its run."""
+    """Everything that is known of a run from its folder."""
 
     folder: Path
     run: RunNote
@@ -84,7 +84,7 @@ def _is_file(state: RunState, name: str) -> bool:
 
 
 def _run_of_files(folder: Path) -> dict[str, Any]:
-    """Facts that a folder without a journal tells of its run."""
+    """Return the facts about a run without a journal."""
     if heap := read_json(folder, "angle.json"):
         return {"command": "heap", "study": heap.get("study"), "scale": heap.get("scale")}
     if not (manifest := read_json(folder, "study.json")):
@@ -112,8 +112,8 @@ def _ending_of_files(folder: Path) -> ProgressNote:
     if any((folder / name).is_file() for name in ("results.json", "angle.json")):
         return ProgressNote(state="finished", message="The run has ended.")
     if (folder / "study.json").is_file():
-        told = "The run keeps no journal: only its finished heaps can be shown."
-        return ProgressNote(state="interrupted", message=told)
+        message = "The run keeps no journal: only its finished heaps can be shown."
+        return ProgressNote(state="interrupted", message=message)
     return ProgressNote(state="waiting", message="No run has begun in this folder yet.")
 
 
@@ -123,7 +123,7 @@ def _cases(folder: Path) -> dict[str, dict[str, Value]]:
     lines = [*read_lines(folder, f"{JOURNAL}/{CASES}", CASES_SHOWN)] or _cases_of_tables(folder)
     for line in map(values_of, lines):
         key = str(line.get("case_key") or line.get("name") or len(cases))
-        if "status" in line:  # the last to end stands last
+        if "status" in line:  # the last to end comes last
             cases[key] = cases.pop(key, {}) | line
         else:
             cases.setdefault(key, {}).update(line)
@@ -182,6 +182,6 @@ def title_of(case: Mapping[str, Value]) -> str:
     """Name of a case for people, as ``screening, run 3, replicate 1``."""
     if "stage" not in case:
         return "a case"
-    told = [str(case["stage"]).replace("_", " ")]
-    told += [f"{name} {case[name]}" for name in ("run", "replicate") if case.get(name) is not None]
-    return ", ".join(told)
+    words = [str(case["stage"]).replace("_", " ")]
+    words += [f"{name} {case[name]}" for name in ("run", "replicate") if case.get(name) is not None]
+    return ", ".join(words)

@@ -13,11 +13,11 @@ from plotly.offline import get_plotlyjs
 
 from experiments.io.errors import InputError
 from experiments.io.plain_data import jsonable
-from experiments.live.charts import charts_of
-from experiments.live.drawing import heap_spheres
-from experiments.live.folder import inside
-from experiments.live.guard import FILE_POLICY
-from experiments.live.state import RunState
+from experiments.live.access import FILE_POLICY
+from experiments.live.drawn_heaps import heap_spheres
+from experiments.live.run_charts import charts_of
+from experiments.live.run_files import inside
+from experiments.live.run_state import RunState
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -121,7 +121,7 @@ def watch_routes(folder_of: FolderOf, base: str = "/{token}") -> list[Route]:
 def state_text(folder: Path) -> bytes:
     """State of a folder as JSON for the page."""
     state = RunState.read(folder)
-    told = {
+    shown = {
         "folder": str(folder.resolve().name or folder),
         "run": state.run.model_dump(include={"command", "study", "scale", "device"}),
         "progress": state.progress.model_dump() | {"left_text": state.left},
@@ -135,11 +135,11 @@ def state_text(folder: Path) -> bytes:
             for chart in charts_of(state)
         ],
     }
-    return json.dumps(jsonable(told), allow_nan=False).encode()
+    return json.dumps(jsonable(shown), allow_nan=False).encode()
 
 
 def _case_table(state: RunState) -> dict[str, Any]:
-    """The cases that ended last, and how many there are."""
+    """Return the cases that ended last, and how many there are."""
     ended = [case for case in state.cases.values() if "status" in case]
     shown = ended[-CASE_ROWS:][::-1]
     columns = list(dict.fromkeys(key for case in shown for key in case if key not in HIDDEN))
@@ -148,16 +148,20 @@ def _case_table(state: RunState) -> dict[str, Any]:
     return {"columns": columns, "rows": rows, "ended": len(ended), "planned": len(state.cases)}
 
 
+def problems_of(error: InputError) -> dict[str, Any]:
+    """Return the message of an error, and the place, problem and value of each fault."""
+    rows = [{"problem": each.problem, "value": each.value, "place": each.place} for each in error.problems]
+    return {"error": str(error), "problems": rows}
+
+
 def refused(request: Request, error: Exception) -> Response:
-    """Answer what an input breaks: the command line's own message."""
+    """Answer an input error with the command line's message."""
     from starlette.responses import JSONResponse
 
-    problems = error.problems if isinstance(error, InputError) else ()
-    rows = [{"problem": each.problem, "value": each.value, "place": each.place} for each in problems]
-    return JSONResponse({"error": str(error), "problems": rows}, status_code=422)
+    return JSONResponse(problems_of(error) if isinstance(error, InputError) else {}, status_code=422)
 
 
 def _missing() -> Response:
     from starlette.responses import JSONResponse
 
-    return JSONResponse({"error": "there is no such file"}, status_code=404)
+    return JSONResponse({"error": "no such file"}, status_code=404)

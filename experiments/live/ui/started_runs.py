@@ -1,4 +1,4 @@
-"""Runs that the page to start from began: commands of their own, which go on without it."""
+"""StartedRuns that the page to start from began: commands of their own, which go on without it."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import IO, Any
 
 from experiments.io.errors import InputError
-from experiments.live.folder import matching
-from experiments.live.state import RunState
-from experiments.live.ui.workshop import command_line
+from experiments.live.run_files import matching
+from experiments.live.run_state import RunState
+from experiments.live.ui.study_folder import command_line
 
 PROGRAM = (sys.executable, "-c", "from experiments.cli import main; main()")
 """Words that run ``dem-warp``, also where it is not on the path."""
 
-TOLD = 4_000
+SHOWN = 4_000
 """Characters of a command's messages that are shown, its last ones."""
 
 
@@ -42,28 +42,22 @@ class Started:
     def messages(self) -> str:
         """Last messages of the command."""
         self.output.seek(0, os.SEEK_END)
-        self.output.seek(max(0, self.output.tell() - TOLD))
+        self.output.seek(max(0, self.output.tell() - SHOWN))
         return self.output.read().decode("utf-8", errors="replace").replace("\r", "\n")
 
 
-class Runs:
-    """Runs of a folder: those that were started here, and those that lie in its ``out``."""
+class StartedRuns:
+    """Runs in a folder: those that were started here, and those below its ``out``."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._started: dict[str, Started] = {}
 
     def start(self, words: Sequence[str], out: str) -> str:
-        """Start a command whose results go to a folder, and return that folder's name.
-
-        Raises
-        ------
-        InputError
-            When a run that was started here is at work there.
-        """
+        """Start a command whose results go to a folder, and return that folder's name."""
         place = self._place(out)
         if (before := self._started.get(place)) and before.process.poll() is None:
-            raise InputError(place, "expected one run at a time works in a folder", "another at work")
+            raise InputError(place, "another run is using this folder")
         output = tempfile.TemporaryFile()  # noqa: SIM115  (it lives as long as the run)
         process = subprocess.Popen(
             [*PROGRAM, *words],
@@ -83,46 +77,34 @@ class Runs:
             self._started[place].process.terminate()
 
     def resume(self, place: str) -> str:
-        """Go on with a run that was started here and has ended.
-
-        Raises
-        ------
-        InputError
-            When there is none.
-        """
+        """Resume a run that was started here and has ended."""
         if place not in self._started:
             raise InputError("resume", "must be a run that was started from this page", place)
         words = [word for word in self._started[place].words if word != "--resume"]
         return self.start([*words, "--resume"], place)
 
     def path(self, place: str) -> Path:
-        """Folder of a run.
-
-        Raises
-        ------
-        InputError
-            When there is none of this name.
-        """
+        """Folder of a run."""
         if place not in self.names():
             raise InputError("run", "must be the folder of a run", place)
         return self.folder / place
 
     def names(self) -> list[str]:
         """Folders of all runs, those that were started here first."""
-        lying = [
+        others = [
             path.relative_to(self.folder).as_posix()
             for path in matching(self.folder, "out/*/")
             if _is_run(path) and not path.is_symlink()
         ]
-        return list(dict.fromkeys([*reversed(self._started), *lying]))
+        return list(dict.fromkeys([*reversed(self._started), *others]))
 
     def listed(self) -> list[dict[str, Any]]:
-        """Tell of every run: its folder, command, state and messages."""
-        return [self._told(name) for name in self.names()]
+        """Describe every run: its folder, command, state and messages."""
+        return [self._described(name) for name in self.names()]
 
-    def _told(self, name: str) -> dict[str, Any]:
+    def _described(self, name: str) -> dict[str, Any]:
         state, started = RunState.read(self.folder / name), self._started.get(name)
-        told: dict[str, Any] = {
+        row: dict[str, Any] = {
             "folder": name,
             "study": state.run.study,
             "state": state.progress.state,
@@ -131,13 +113,13 @@ class Runs:
             "outputs": [each for each in state.outputs if each.endswith(".html") or each == "snapshot.png"],
         }
         if started is None:
-            return told | {"command": "", "messages": "", "running": False, "code": None}
+            return row | {"command": "", "messages": "", "running": False, "code": None}
         code = started.process.poll()
-        if code is None and told["state"] != "running":
-            told |= {"state": "running", "message": "The command is starting."}
-        elif code not in (None, 0) and told["state"] in ("running", "waiting"):
-            told |= {"state": "failed", "message": f"The command ended with the exit code {code}."}
-        return told | {
+        if code is None and row["state"] != "running":
+            row |= {"state": "running", "message": "The command is starting."}
+        elif code not in (None, 0) and row["state"] in ("running", "waiting"):
+            row |= {"state": "failed", "message": f"The command ended with the exit code {code}."}
+        return row | {
             "command": started.command, "messages": started.messages, "running": code is None, "code": code,
         }  # fmt: skip
 

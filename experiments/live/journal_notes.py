@@ -1,4 +1,4 @@
-"""Notes of a journal as the page reads them: a folder may come from anyone; what is no note is left out."""
+"""Entries of a journal as the page reads them; invalid entries are ignored."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Value = str | int | float | bool | None
 
 
 class Note(BaseModel):
-    """Base of every note: other keys than its own are passed over."""
+    """Base of every note; unknown keys are ignored."""
 
     model_config = ConfigDict(extra="ignore", strict=True, frozen=True, allow_inf_nan=False)
 
@@ -99,7 +99,7 @@ class StageNote(Note):
 
 
 def noted(kind: type[AnyNote], found: Any) -> AnyNote | None:
-    """Read a note; None where it is none."""
+    """Validate an entry; return None if it is invalid."""
     try:
         return kind.model_validate(found)
     except (ValidationError, RecursionError):
@@ -107,7 +107,7 @@ def noted(kind: type[AnyNote], found: Any) -> AnyNote | None:
 
 
 def all_noted(kind: type[AnyNote], found: Iterable[Any]) -> list[AnyNote]:
-    """Read notes; what is none is left out."""
+    """Validate entries; leave out invalid ones."""
     return [note for each in found if (note := noted(kind, each)) is not None]
 
 

@@ -1,4 +1,4 @@
-"""Files of a run's folder, which may come from anyone: read whole, of a known size, and never by a link."""
+"""Safe reading of a run's files, which may come from anyone: no links, a limited size."""
 
 from __future__ import annotations
 
@@ -20,13 +20,7 @@ LONGEST = 2_000
 
 
 def inside(folder: Path, name: str) -> Path:
-    """Return the path of a regular file below a folder.
-
-    Raises
-    ------
-    InputError
-        When the name leads out of the folder, a link stands on the way, or there is no such file.
-    """
+    """Return the path of a regular file below a folder."""
     parts = PurePosixPath(name).parts
     if not parts or name.startswith("/") or "\\" in name or "\0" in name or ".." in parts:
         raise InputError(str(folder), "must name a file below the folder", name)
@@ -38,14 +32,14 @@ def inside(folder: Path, name: str) -> Path:
         except (OSError, ValueError):
             raise InputError(str(folder), "must name a file below the folder", name) from None
         if stat.S_ISLNK(facts.st_mode):
-            raise InputError(str(folder), "expected links are not followed", name)
+            raise InputError(str(folder), "links are not followed", name)
     if not stat.S_ISREG(facts.st_mode):
         raise InputError(str(folder), "must name a regular file", name)
     return path
 
 
 def matching(folder: Path, pattern: str) -> list[Path]:
-    """List what matches a pattern in a folder, the newest first; nothing where it goes meanwhile."""
+    """List what matches a pattern in a folder, the newest first."""
     try:
         return sorted(folder.glob(pattern), key=changed, reverse=True)
     except OSError:
@@ -61,7 +55,7 @@ def changed(path: Path) -> float:
 
 
 def read_json(folder: Path, name: str) -> dict[str, Any]:
-    """Read a JSON object; empty where there is none, or it is damaged."""
+    """Read a JSON object; return {} if it is missing or damaged."""
     try:
         found = json.loads(_read(folder, name))
     except (OSError, ValueError, RecursionError):
@@ -70,7 +64,7 @@ def read_json(folder: Path, name: str) -> dict[str, Any]:
 
 
 def read_lines(folder: Path, name: str, most: int = LONGEST) -> Iterator[dict[str, Any]]:
-    """Read the last JSON objects of a file with one a line; damaged lines, and the one half written, not."""
+    """Read the last JSON objects of a file, one per line; skip damaged lines."""
     try:
         lines = _read(folder, name).splitlines()[-most:]
     except (OSError, ValueError):
@@ -85,10 +79,7 @@ def read_lines(folder: Path, name: str, most: int = LONGEST) -> Iterator[dict[st
 
 
 def read_table(folder: Path, name: str, most: int = LONGEST) -> list[dict[str, str | int | float]]:
-    """Read the last rows of a table that a run has written, each without its empty cells.
-
-    There are none where the file is missing or damaged.
-    """
+    """Read the last rows of a table without empty cells; return [] if it is missing or damaged."""
     try:
         rows = list(csv.DictReader(_read(folder, name).splitlines(), restval=""))[-most:]
     except (OSError, ValueError, csv.Error):
@@ -98,7 +89,7 @@ def read_table(folder: Path, name: str, most: int = LONGEST) -> list[dict[str, s
 
 
 def _value(text: str) -> str | int | float | None:
-    """Number that a cell holds, or its text; None for an empty one."""
+    """Return the number in a cell, or its text; None for an empty cell."""
     for kind in (int, float):
         try:
             number: int | float = kind(text)

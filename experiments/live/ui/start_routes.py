@@ -1,4 +1,4 @@
-"""The page to start from: what its buttons ask for, answered by the workshop and its runs."""
+"""The page to start from: what its buttons ask for, answered by the place and its runs."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.io.errors import InputError
 from experiments.live.server import guarded
-from experiments.live.ui.started import Runs
-from experiments.live.ui.workshop import LARGEST_UPLOAD, Workshop, command_line, problems_of
-from experiments.live.watched import page_file, page_routes, watch_routes
+from experiments.live.ui.started_runs import StartedRuns
+from experiments.live.ui.study_folder import LARGEST_UPLOAD, StudyFolder, command_line
+from experiments.live.watch_routes import page_file, page_routes, problems_of, watch_routes
 from experiments.runs.choices import default_folder
 from imaging import PictureError
 
@@ -30,17 +30,17 @@ Answer = Callable[[dict[str, Any]], Any]
 
 def ui_app(folder: Path, token: str) -> ASGIApp:
     """Build the application of the page to start from."""
-    return guarded(start_routes(Workshop(folder)), token)
+    return guarded(start_routes(StudyFolder(folder)), token)
 
 
-def start_routes(workshop: Workshop) -> list[Route]:
+def start_routes(place: StudyFolder) -> list[Route]:
     """Routes of the page to start from, and of the pages that watch its runs."""
     from starlette.concurrency import run_in_threadpool
     from starlette.responses import JSONResponse
     from starlette.routing import Route
 
-    runs = Runs(workshop.folder)
-    answers = answers_of(workshop, runs)
+    runs = StartedRuns(place.folder)
+    answers = answers_of(place, runs)
 
     def page(request: Request) -> Response:
         return page_file("ui.html")
@@ -57,9 +57,9 @@ def start_routes(workshop: Workshop) -> list[Route]:
         async for part in request.stream():
             data += part
             if len(data) > LARGEST_UPLOAD:
-                break  # the workshop says so
+                break  # the place says so
         name = request.path_params["name"]
-        found = await run_in_threadpool(_kept, workshop, name, bytes(data))
+        found = await run_in_threadpool(_kept, place, name, bytes(data))
         return JSONResponse(found)
 
     return [
@@ -71,17 +71,17 @@ def start_routes(workshop: Workshop) -> list[Route]:
     ]
 
 
-def answers_of(workshop: Workshop, runs: Runs) -> dict[str, Answer]:
+def answers_of(place: StudyFolder, runs: StartedRuns) -> dict[str, Answer]:
     """Answers by what the page asks for."""
     return {
-        "form": lambda asked: workshop.form(),
-        "clump": workshop.clump,
-        "angles": lambda asked: workshop.angles(asked["folder"], asked["fit"]),
-        "draft": lambda asked: workshop.draft(asked["name"], asked["values"], asked["factors"]),
-        "check": lambda asked: workshop.checked(asked["file"], asked["text"]),
-        "write": lambda asked: {"file": workshop.write(asked["file"], asked["text"]).name},
-        "plan": lambda asked: _told(*plan(workshop, asked)),
-        "start": lambda asked: {"folder": runs.start(*plan(workshop, asked))},
+        "form": lambda asked: place.form(),
+        "clump": place.clump,
+        "angles": lambda asked: place.angles(asked["folder"], asked["fit"]),
+        "draft": lambda asked: place.draft(asked["name"], asked["values"], asked["factors"]),
+        "check": lambda asked: place.checked(asked["file"], asked["text"]),
+        "write": lambda asked: {"file": place.write(asked["file"], asked["text"]).name},
+        "plan": lambda asked: _command(*plan(place, asked)),
+        "start": lambda asked: {"folder": runs.start(*plan(place, asked))},
         "stop": lambda asked: runs.stop(asked["folder"]),
         "resume": lambda asked: {"folder": runs.resume(asked["folder"])},
         "runs": lambda asked: runs.listed(),
@@ -89,7 +89,7 @@ def answers_of(workshop: Workshop, runs: Runs) -> dict[str, Answer]:
 
 
 def answered(answer: Answer, body: bytes) -> Any:
-    """Answer a question; what breaks a rule is told in the command line's own words."""
+    """Answer a question; an error has the words of the command line."""
     try:
         asked = json.loads(body or b"{}")
     except (ValueError, RecursionError):
@@ -106,26 +106,20 @@ def answered(answer: Answer, body: bytes) -> Any:
         return {"error": "a question must be one of the page's own", "problems": []}
 
 
-def _kept(workshop: Workshop, name: str, data: bytes) -> dict[str, Any]:
+def _kept(place: StudyFolder, name: str, data: bytes) -> dict[str, Any]:
     try:
-        return {"file": workshop.keep(name, data).relative_to(workshop.folder).as_posix()}
+        return {"file": place.keep(name, data).relative_to(place.folder).as_posix()}
     except InputError as error:
         return problems_of(error)
 
 
-def plan(workshop: Workshop, asked: Mapping[str, Any]) -> tuple[tuple[str, ...], str]:
-    """Write the words of a command, and the folder of its results.
-
-    Raises
-    ------
-    InputError
-        When there is no such command, or the study file breaks a rule.
-    """
+def plan(place: StudyFolder, asked: Mapping[str, Any]) -> tuple[tuple[str, ...], str]:
+    """Write the words of a command, and the folder of its results."""
     command, file = asked["command"], asked["file"]
     if command not in COMMANDS:
         raise InputError("command", f"must be one of {', '.join(COMMANDS)}", command)
     scale = asked.get("scale") or None
-    study = workshop.study(file, scale)
+    study = place.study(file, scale)
     out = asked.get("out") or default_folder(study, COMMANDS[command]).as_posix()
     words = [command, file]
     if command == "discover" and asked.get("measured"):
@@ -136,5 +130,5 @@ def plan(workshop: Workshop, asked: Mapping[str, Any]) -> tuple[tuple[str, ...],
     return tuple(map(str, words)), out
 
 
-def _told(words: tuple[str, ...], out: str) -> dict[str, str]:
+def _command(words: tuple[str, ...], out: str) -> dict[str, str]:
     return {"command": command_line(*words), "out": out}

@@ -1,4 +1,4 @@
-"""Actions of the page to start from in its folder, each by the function that a command calls."""
+"""Actions of the start page in its folder; each calls the function of a command."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from experiments.io.errors import InputError, Problem
 from experiments.io.files import replacing, write_text
 from experiments.io.toml_files import read_toml, toml_text
 from experiments.io.units import read_quantity, read_share
-from experiments.live.folder import inside
+from experiments.live.run_files import inside
+from experiments.live.watch_routes import problems_of
 from experiments.measurement.photographs import (
     PictureOptions,
     find_pictures,
@@ -43,8 +44,8 @@ _FILE_NAME = re.compile(r"[^\W_][\w .()-]{0,120}", re.UNICODE)
 
 
 @dataclass(frozen=True)
-class Workshop:
-    """A folder in which a person works."""
+class StudyFolder:
+    """A folder with study files, pictures and runs."""
 
     folder: Path
 
@@ -74,35 +75,21 @@ class Workshop:
         }
 
     def new_file(self, name: str) -> Path:
-        """Return the path of a file that is taken from a person.
-
-        Raises
-        ------
-        InputError
-            When the name is no plain name, or the file exists.
-        """
+        """Return the path of a file that is taken from a person."""
         parts = name.split("/")
         if not 1 <= len(parts) <= 2 or not all(_FILE_NAME.fullmatch(part) for part in parts):
-            raise InputError(
-                "upload", "expected a file has a plain name, of letters, digits, spaces and .-_()", name
-            )
+            raise InputError("upload", "a file name has only letters, digits, spaces and .-_()", name)
         path = self.folder.joinpath(*parts)
         if any(each.is_symlink() for each in (path, path.parent)):
-            raise InputError("upload", "expected links are not followed", name)
+            raise InputError("upload", "links are not followed", name)
         if path.exists():
-            raise InputError(str(path), "an upload never overwrites a file", "one that exists")
+            raise InputError(str(path), "the file exists")
         return path
 
     def keep(self, name: str, data: bytes) -> Path:
-        """Write an uploaded file; the same one may come twice.
-
-        Raises
-        ------
-        InputError
-            When it is too large, its name is none, or another file has it.
-        """
+        """Write an uploaded file; the same one may come twice."""
         if len(data) > LARGEST_UPLOAD:
-            raise InputError(name, f"expected a file has at most {LARGEST_UPLOAD:,} bytes", f"{len(data):,}")
+            raise InputError(name, f"must have at most {LARGEST_UPLOAD:,} bytes", f"{len(data):,}")
         try:
             path = self.new_file(name)
         except InputError:
@@ -116,13 +103,7 @@ class Workshop:
     # ---- grain and photographs -----------------------------------------------------------------------------
 
     def clump(self, asked: Mapping[str, str]) -> dict[str, Any]:
-        """Make a clump, as ``dem-warp clump`` does; with ``out``, write it too.
-
-        Raises
-        ------
-        InputError
-            As by the command.
-        """
+        """Make a clump, as ``dem-warp clump`` does; with ``out``, write it too."""
         source = asked.get("source", "")
         if ":" not in source:
             source = str(inside(self.folder, source))
@@ -158,13 +139,7 @@ class Workshop:
         return command_line("clump", asked.get("source", ""), *options)
 
     def angles(self, folder: str, fit: str) -> dict[str, Any]:
-        """Measure the photographs of a folder, as ``dem-warp angle`` does.
-
-        Raises
-        ------
-        InputError
-            As by the command.
-        """
+        """Measure the photographs of a folder, as ``dem-warp angle`` does."""
         pictures = find_pictures(self._plain(folder), self.folder, "pictures")
         rows = measure_pictures(pictures, PictureOptions(fit))
         mean = mean_angle(rows)
@@ -177,7 +152,7 @@ class Workshop:
 
     def _plain(self, name: str) -> str:
         if not _FILE_NAME.fullmatch(name) or (self.folder / name).is_symlink():
-            raise InputError("pictures", "must be a folder of photographs beside the study", name)
+            raise InputError("pictures", "must be a folder of photographs next to the study", name)
         return name
 
     # ---- the study file ------------------------------------------------------------------------------------
@@ -185,17 +160,7 @@ class Workshop:
     def draft(
         self, name: str, values: Mapping[str, str], factors: Sequence[Mapping[str, str]]
     ) -> dict[str, Any]:
-        """Write a study of the form's values, and check it.
-
-        Parameters
-        ----------
-        name
-            Name of the grain, and of the file.
-        values
-            What was written for each place of a study file, as ``grain.density``; nothing where it is empty.
-        factors
-            Keys of each ``[[factor]]``.
-        """
+        """Write a study of the form's values, and check it."""
         path = new_study_path(name, self.folder)
         document: dict[str, Any] = {"name": path.stem}
         for place, text in values.items():
@@ -214,19 +179,13 @@ class Workshop:
         try:
             with self._draft_file(file, text) as path:
                 study = load_study(path)
-                told = {"note": study.note, "doubtful": study.narrowness(), "scales": study_scales(path)}
+                found = {"note": study.note, "doubtful": study.narrowness(), "scales": study_scales(path)}
         except InputError as error:
             return problems_of(error)
-        return told
+        return found
 
     def write(self, file: str, text: str) -> Path:
-        """Write a study file that keeps every rule.
-
-        Raises
-        ------
-        InputError
-            When it breaks one, its name is none, or it exists.
-        """
+        """Write a study file that keeps every rule."""
         path = new_study_path(file, self.folder)
         with self._draft_file(path.name, text) as draft:
             load_study(draft)
@@ -252,12 +211,6 @@ class Workshop:
             raise type(error).of(found) from None
         finally:
             path.unlink(missing_ok=True)
-
-
-def problems_of(error: InputError) -> dict[str, Any]:
-    """Rules that an input breaks, in the command line's own words, and rule, value and place of each."""
-    rows = [{"problem": each.problem, "value": each.value, "place": each.place} for each in error.problems]
-    return {"error": str(error), "problems": rows}
 
 
 def command_line(*words: str) -> str:
