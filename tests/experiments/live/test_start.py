@@ -290,23 +290,6 @@ def test_folders_that_go_while_they_are_read_are_no_error(
     assert runs.listed() == []
 
 
-def test_a_heap_is_started_watched_and_shown(
-    ask: Ask, client: TestClient, small_text: str, folder: Path
-) -> None:
-    (folder / "small.toml").write_text(small_text, encoding="utf-8")
-    place = ask("start", command="heap", file="small.toml", device="cpu")["folder"]
-    assert place == "out/small-heap-1"
-    ended = time.monotonic() + 180.0
-    while (run := ask("runs")[0])["running"]:
-        assert time.monotonic() < ended
-    assert (run["code"], run["state"]) == (0, "finished"), run["messages"]
-    state = client.get(f"/{TOKEN}/run/{place}/-/state.json").json()
-    assert [heap["id"] for heap in state["heaps"]] == ["heap"]
-    spheres = np.frombuffer(client.get(f"/{TOKEN}/run/{place}/-/heap/heap").content, "<f4").reshape(-1, 5)
-    assert len(spheres) <= 30
-    assert client.get(f"/{TOKEN}/run/{place}/-/file/snapshot.png").headers["content-type"] == "image/png"
-
-
 def test_a_question_that_is_none_is_no_traceback(client: TestClient) -> None:
     for body in (b"[1]", b"{", b"\xff", b'{"source": 3}', b'{"values": 3, "name": "a", "factors": {}}', b""):
         for what in ("clump", "draft", "write", "start", "angles", "plan", "stop", "resume"):
