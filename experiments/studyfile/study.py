@@ -116,7 +116,7 @@ class Study(Physics):
         """The study file."""
         return self._places.file
 
-    @property
+    @cached_property
     def scale(self) -> str | None:
         """The chosen scale; None: the study as written."""
         return self._places.scale
@@ -126,7 +126,7 @@ class Study(Physics):
         """The study as written, the scale merged over it: plain JSON-able data."""
         return copy.deepcopy(self._document)
 
-    @property
+    @cached_property
     def target(self) -> Target:
         """Responses that the cases must match.
 
@@ -145,13 +145,13 @@ class Study(Physics):
             raise StudyError(str(self.file), "needs a [target] or a [[response]] to be calibrated")
         return self._target
 
-    @property
+    @cached_property
     def scenes(self) -> dict[str, SceneSection]:
         """Every scene by its name: the study's own, further ones, those of its conditions."""
         tests = {name: self.under(name).scene for name in self.condition_sections}
         return {TARGET_SCENE: self.scene, **self.response_scenes, **tests}
 
-    @property
+    @cached_property
     def measurable(self) -> tuple[Observable, ...]:
         """Observables that a laboratory can measure of the study's test, in the order of every table."""
         return measurable(self.scene.observables, self.scene.leaves_a_heap, self.measurement.outline)

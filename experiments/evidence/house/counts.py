@@ -1,8 +1,8 @@
 """Counts of lines, rooms, imports, data and like code, each with the limit that a test holds.
 
-A room is a folder directly in a package, or a file there. An import between rooms is a pair of rooms. A floor is
-the longest chain of imports below a room. Like code is a run of six statements that are equal once names and
-values are erased, and that at most eight files share; a run that only declares fields is data.
+A room is a folder directly in a package, or a file there. An import between rooms is a pair of rooms.
+A floor is the longest chain of imports below a room. Like code is a run of six statements that are equal
+once names and values are erased, and that at most eight files share; a run of fields alone is data.
 """
 
 from __future__ import annotations
