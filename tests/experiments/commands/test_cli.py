@@ -28,7 +28,7 @@ COMMANDS = [command.callback.__name__ for command in app.registered_commands if 
 
 def last_line_of(program: str) -> str:
     """Run a program in a fresh interpreter; return the last line that it prints."""
-    command, home = [sys.executable, "-c", program], Path(run.__file__).parents[3]
+    command, home = [sys.executable, "-c", program], Path(run.__file__).parents[2]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=home)
     return done.stdout.splitlines()[-1]
 
