@@ -194,7 +194,7 @@ class Study(Physics):
 
     def with_target(self, target: Target) -> Study:
         """Return the same study, whose cases must match something else."""
-        study = self.model_copy()
+        study = self._changed(self._document)
         study._target = target
         return study
 

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pandas as pd
 import pytest
 
 from doe import Factor, Sample
-from experiments.calibrate import ClimbEnd, Outcome, calibrate
+from experiments.calibrate import Campaign, ClimbEnd, Outcome, calibrate
 from experiments.calibrate.results import STAGES
 from experiments.studyfile.campaign import CampaignSettings, Response, Target, Twin
 
@@ -86,13 +87,24 @@ def two_frictions(row: Mapping[str, float]) -> float:
     return 24.0 + 2.5 * e + 5.0 * f + 0.8 * e * f - 1.0 * f * f
 
 
+def ends_after_screening(angle: Angle) -> AnalyticHeaps:
+    """Make heaps that all fail on the climb, where no later stage is wanted."""
+    return AnalyticHeaps(angle, fails=lambda row: row["stage"] == "climb")
+
+
 def settings(**sections: Mapping) -> CampaignSettings:
     return CampaignSettings.model_validate(sections)
 
 
-def test_the_whole_chain_finds_a_known_contour() -> None:
+@cache
+def chain() -> tuple[Campaign, AnalyticHeaps]:
+    """Calibrate the default study once."""
     heaps = AnalyticHeaps(two_frictions)
-    campaign = calibrate(AnalyticStudy(), heaps)
+    return calibrate(AnalyticStudy(), heaps), heaps
+
+
+def test_the_whole_chain_finds_a_known_contour() -> None:
+    campaign, heaps = chain()
     assert campaign.outcome is Outcome.CALIBRATED
     assert list(campaign.stages) == list(STAGES)
     assert set(campaign.selection.kept) == {"E", "F"}
@@ -103,10 +115,12 @@ def test_the_whole_chain_finds_a_known_contour() -> None:
     crossing = {**campaign.optimum.settings, **campaign.climb.crossing}
     # The crossing is interpolated between means of two heaps over a step of less than 3 deg.
     assert two_frictions(crossing) == pytest.approx(26.0, abs=1.0)
+    assert campaign.cases["seed"].is_unique
+    assert len(campaign.cases) == sum(map(len, heaps.tables))
 
 
 def test_contour_and_region_belong_to_the_reduced_surface() -> None:
-    campaign = calibrate(AnalyticStudy(), AnalyticHeaps(two_frictions))
+    campaign, _ = chain()
     optimum, fit = campaign.optimum, campaign.surface.leading.reduced
     assert fit.predict(optimum.point)["mean"].iloc[0] == pytest.approx(26.0, abs=1e-9)
     np.testing.assert_allclose(fit.predict(optimum.contour)["mean"], 26.0, atol=1e-9)
@@ -120,31 +134,17 @@ def test_contour_and_region_belong_to_the_reduced_surface() -> None:
 
 
 def test_same_seeds_give_the_same_campaign_and_other_seeds_another() -> None:
-    first, again = (calibrate(AnalyticStudy(), AnalyticHeaps(two_frictions)).to_dict() for _ in range(2))
+    first = chain()[0].to_dict()
+    assert first == calibrate(AnalyticStudy(), AnalyticHeaps(two_frictions)).to_dict()
     other_study = AnalyticStudy(campaign=settings(seeds={"campaign": 11}))
-    other = calibrate(other_study, AnalyticHeaps(two_frictions)).to_dict()
-    assert first == again
+    other = calibrate(other_study, ends_after_screening(two_frictions)).to_dict()
     assert first["noise_floor"]["responses"] != other["noise_floor"]["responses"]
-
-
-def test_every_case_has_its_own_seed_and_a_batch_holds_a_whole_stage() -> None:
-    heaps = AnalyticHeaps(two_frictions)
-    study = AnalyticStudy(target=hidden(E=0.5, F=0.4))
-    campaign = calibrate(study, heaps)
-    assert campaign.cases["seed"].is_unique
-    assert [sorted(set(table["stage"])) for table in heaps.tables] == [
-        ["noise_floor", "screening", "target"],
-        ["climb"],
-        ["surface"],
-        ["verification"],
-    ]
-    assert len(campaign.cases) == sum(map(len, heaps.tables))
 
 
 def test_more_replicates_change_no_other_case() -> None:
     def cases(replicates: int) -> pd.DataFrame:
         study = AnalyticStudy(campaign=settings(screening={"replicates": replicates}))
-        table = calibrate(study, AnalyticHeaps(two_frictions)).screening.cases
+        table = calibrate(study, ends_after_screening(two_frictions)).screening.cases
         return table[table["replicate"] == 1].reset_index(drop=True)
 
     pd.testing.assert_frame_equal(cases(1), cases(3))
@@ -153,19 +153,19 @@ def test_more_replicates_change_no_other_case() -> None:
 def test_a_twin_recovers_its_hidden_truth_in_the_compatible_region() -> None:
     truth = {"E": 0.50, "F": 0.42}
     inside = []
-    for seed in range(10, 34, 2):
+    for seed in range(10, 22, 2):
         seeds = {"campaign": seed, "target": seed + 1}
         study = AnalyticStudy(target=hidden(**truth), campaign=settings(seeds=seeds))
         campaign = calibrate(study, AnalyticHeaps(two_frictions))
         assert campaign.target.truth["A"] == pytest.approx(0.29)
         inside.append(campaign.optimum is not None and campaign.optimum.truth.compatible is True)
-    # Each region holds the truth with probability 0.95: fewer than 10 of 12 come once in 50 times.
-    assert sum(inside) >= 10
+    # Each region holds the truth with probability 0.95: fewer than 5 of 6 come once in 30 times.
+    assert sum(inside) >= 5
 
 
 def test_a_truth_that_is_not_where_the_angle_says_is_called_incompatible() -> None:
     def shifted(row: Mapping[str, float]) -> float:
-        # The target heaps stand 1.5 deg higher than the same settings do later: a model error of 5 noise sd.
+        # The target heaps are 1.5 deg higher than the same settings do later: a model error of 5 noise sd.
         return two_frictions(row) + (1.5 if row["stage"] == "target" else 0.0)
 
     study = AnalyticStudy(target=hidden(E=0.46, F=0.38))
@@ -209,14 +209,12 @@ def test_no_significant_factor() -> None:
     )
 
 
-def test_all_factors_significant_keeps_the_strongest_and_says_so() -> None:
+def test_of_many_significant_factors_the_strongest_are_kept() -> None:
     weights = dict(zip("ABEFG", (1.0, 1.5, 3.0, 2.5, 2.0), strict=True))
-    heaps = AnalyticHeaps(lambda row: 25.0 + sum(w * coded(row, n) for n, w in weights.items()))
-    study = AnalyticStudy(campaign=settings(selection={"at_most": 2}))
-    campaign = calibrate(study, heaps)
-    assert campaign.selection.kept == ("E", "F")
-    assert "Every factor is significant" in campaign.selection.decisions[0].outcome
-    assert campaign.outcome is Outcome.CALIBRATED
+    heaps = ends_after_screening(lambda row: 25.0 + sum(w * coded(row, n) for n, w in weights.items()))
+    selection = calibrate(AnalyticStudy(campaign=settings(selection={"at_most": 2})), heaps).selection
+    assert selection.kept == ("E", "F")
+    assert "Every factor is significant" in selection.decisions[0].outcome
 
 
 def test_a_climb_that_never_reaches_the_target() -> None:
@@ -304,8 +302,7 @@ def test_without_equivalence_a_campaign_is_not_calibrated() -> None:
 @pytest.mark.parametrize("names", [("F",), ("E", "F", "G")])
 def test_one_and_three_kept_factors(names: tuple[str, ...]) -> None:
     heaps = AnalyticHeaps(lambda row: 25.0 + sum(3.0 * coded(row, name) for name in names))
-    study = AnalyticStudy(campaign=settings(selection={"alpha": 0.01}))
-    campaign = calibrate(study, heaps)
+    campaign = calibrate(AnalyticStudy(campaign=settings(selection={"alpha": 0.01})), heaps)
     assert set(campaign.selection.kept) == set(names)
     assert campaign.outcome is Outcome.CALIBRATED
     assert campaign.optimum.contour.shape[1] == len(names)
@@ -314,7 +311,7 @@ def test_one_and_three_kept_factors(names: tuple[str, ...]) -> None:
     assert set(unidentified) == (set() if len(names) == 1 else set(names))
 
 
-@pytest.mark.parametrize("stage", ["target", "screening", "climb", "verification"])
+@pytest.mark.parametrize("stage", ["target", "screening", "verification"])
 def test_a_stage_whose_cases_all_fail_ends_the_campaign(stage: str) -> None:
     heaps = AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == stage)
     campaign = calibrate(AnalyticStudy(target=hidden(E=0.5, F=0.42)), heaps)

@@ -59,14 +59,14 @@ def at_coded(e: float, f: float) -> dict[str, float]:
     return {"E": 1.0 + HALF_RANGE * e, "F": 1.0 + HALF_RANGE * f}
 
 
-@pytest.mark.parametrize(("step", "half_range"), [(0.1, 0.4), (-0.1, 0.4), (0.7, 0.7), (-0.7, 0.7)])
+@pytest.mark.parametrize(("step", "half_range"), [(0.1, 0.4), (-0.7, 0.7)])
 def test_a_half_range_is_a_climb_step_but_not_too_short(step: float, half_range: float) -> None:
     assert explored(3.0, step).half_range == pytest.approx({"E": half_range, "F": half_range})
 
 
 # The line E + F = s in coded units lies s / sqrt(2) from the centre, nearest at (s / 2, s / 2). The axial
 # points reach sqrt(2), the runs' circle too: s = 2 passes through the corner of the two-level part.
-@pytest.mark.parametrize(("line", "extent"), [(0.0, 1.0), (1.0, 1.0), (-1.9, 1.0)])
+@pytest.mark.parametrize(("line", "extent"), [(0.0, 1.0), (-1.9, 1.0)])
 def test_the_nearest_point_of_a_line(line: float, extent: float) -> None:
     optimum = find_optimum(PlaneStudy(), explored(3.0), aim(20.0 + 3.0 * line))
     # Standard error of the fit in coded units: below NOISE / slope; ten of them.
@@ -116,7 +116,7 @@ def test_where_a_hidden_truth_lies(truth: tuple[float, float], inside: bool, com
 def test_a_truth_is_judged_as_the_cells_of_the_region_are() -> None:
     surface = explored(0.02)
     region = find_optimum(PlaneStudy(), surface, aim(20.0)).region
-    cells = np.linspace(0, len(region.mask) - 1, 15).astype(int)
+    cells = np.linspace(0, len(region.mask) - 1, 6).astype(int)
     truths = [{str(n): float(v) for n, v in region.natural.iloc[cell].items()} for cell in cells]
     judged = [find_optimum(PlaneStudy(), surface, aim(20.0, truth)).truth.compatible for truth in truths]
     assert judged == region.mask[cells].tolist()
