@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,22 +13,15 @@ from doe import Sample
 from experiments.io.errors import InputError
 from experiments.io.units import Quantity
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.photographs import (
-    PictureOptions,
-    find_pictures,
-    left_out_notes,
-    measure_pictures,
-    require_separate,
-    target_sample,
-    used_rows,
-)
 from experiments.measurement.profile_responses import counted_twice, with_profiles
 from experiments.measurement.readings import require_same_fit
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import ANGLE, BY_NAME
 from experiments.studyfile.target_section import ResponseSection, TargetSection
-from imaging import View
+
+if TYPE_CHECKING:
+    from experiments.measurement.photographs import PictureOptions
 
 
 @dataclass(frozen=True)
@@ -63,12 +56,7 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
     if section.fit is not None:
         require_same_fit(section.fit, study.measurement.fit, f"{place}.fit")
     if section.pictures is not None:
-        options = _options(study)
-        rows = measure_pictures(find_pictured(study), options)
-        sample = target_sample(rows, options, f"{place}.pictures")
-        names = [Path(row["picture"]).name for row in used_rows(rows, options)]
-        note = f"{len(names)} pictures: {', '.join(names)}"
-        return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), left_out_notes(rows, options)
+        return _with_pictures(study, f"{place}.pictures")
     if section.file is not None:
         path = study.file.parent / section.file
         measured = read_measured(path, study)
@@ -83,6 +71,17 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
         leading = _asked(study, found, notes, path)
         return _given(study, found, f"file {section.file}", leading), tuple(notes)
     return study, ()
+
+
+def _with_pictures(study: Study, place: str) -> tuple[Study, tuple[str, ...]]:
+    from experiments.measurement.photographs import left_out_notes, measure_pictures, target_sample, used_rows
+
+    options = _options(study)
+    rows = measure_pictures(find_pictured(study), options)
+    sample = target_sample(rows, options, place)
+    names = [Path(row["picture"]).name for row in used_rows(rows, options)]
+    note = f"{len(names)} pictures: {', '.join(names)}"
+    return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), left_out_notes(rows, options)
 
 
 def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path: Path) -> Replicated | None:
@@ -102,6 +101,9 @@ def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path
 
 
 def _options(study: Study) -> PictureOptions:
+    from experiments.measurement.photographs import PictureOptions
+    from imaging import View
+
     section, fit = study.target_section, study.measurement.fit
     if section is None:
         return PictureOptions(fit)
@@ -120,6 +122,8 @@ def find_pictured(study: Study) -> list[Path]:
     if section.observable != ANGLE or section.scene != TARGET_SCENE:
         problem = "photographs give only the angle of the study's own scene"
         raise InputError(place, problem, section.title)
+    from experiments.measurement.photographs import find_pictures, require_separate
+
     paths = find_pictures(section.pictures, study.file.parent, place, section.by)
     require_separate(paths, _options(study), place)
     return paths

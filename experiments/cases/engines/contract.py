@@ -94,7 +94,7 @@ def command_program(
 
 
 def _is_script(word: str) -> bool:
-    """True if a word is a file, but not a compiled program."""
+    """Return whether a word is a file, but not a compiled program."""
     path = Path(word)
     if not (path.is_absolute() and path.is_file()):
         return False

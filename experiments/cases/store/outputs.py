@@ -59,7 +59,7 @@ def publishing(
 
 
 def is_listed(folder: Path, name: str) -> bool:
-    """True if the list of a folder's outputs names a file."""
+    """Return whether the list of a folder's outputs names a file."""
     return name in _read_list(folder)["files"]
 
 

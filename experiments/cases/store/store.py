@@ -50,7 +50,7 @@ class Store:
         return len(list(self.folder.glob("*.npz")))
 
     def has(self, key: str) -> bool:
-        """True if the case is stored and whole."""
+        """Return whether the case is stored and whole."""
         return self.path(key).is_file() and self.damage(key) is None
 
     def damage(self, key: str) -> str | None:

@@ -40,7 +40,7 @@ Write = Callable[..., Path]
 
 @pytest.fixture(scope="module")
 def card(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> Path:
-    """A card that was calibrated on cones of 15 degrees and 30 more for a friction of 1; the target is 30."""
+    """Calibrate a card on cones of 15 degrees and 30 more for a friction of 1; the target is 30."""
     folder = tmp_path_factory.mktemp("card")
     study = folder / "small.toml"
     study.write_text(small_text, encoding="utf-8")

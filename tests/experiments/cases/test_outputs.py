@@ -21,13 +21,13 @@ WriteStudy = Callable[..., Path]
 
 @pytest.fixture
 def other(write_study: WriteStudy) -> Study:
-    """The small study with another target."""
+    """Load the small study with another target."""
     return load_study(write_study(("n = 5", "n = 6")))
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder that a run may make."""
+    """Return a folder that a run may make."""
     return tmp_path / "out"
 
 

@@ -60,7 +60,7 @@ def test_another_engine_makes_another_key(
 
 
 def with_moved_spheres(case: Case, shape: ClumpShape, move: Callable[[float], float]) -> Case:
-    """The case, its grains of a shape whose spheres' coordinates and radii were moved."""
+    """Move the coordinates and radii of the spheres of the case's grains."""
     moved = dataclasses.replace(
         shape, centers=np.vectorize(move)(shape.centers), radii=np.vectorize(move)(shape.radii)
     )

@@ -48,7 +48,7 @@ def study_for(write_study: Write, name: str, approximate: bool = True) -> Study:
 
 @pytest.fixture
 def liggghts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_study: Study) -> Callable[[str], None]:
-    """A stand-in for LIGGGHTS, which dumps two spheres or goes wrong."""
+    """Write a stand-in for LIGGGHTS, which dumps two spheres or goes wrong."""
     test = ExportedTest("Small", small_study.case({}, 1), "small.toml")
     translation = export_input(test, "liggghts", approximate=True)
     folder = tmp_path / "bin"
