@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Sequence
@@ -9,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from dem_warp import Case, CaseResult
+from experiments.report.material_card import write_material_card
+from experiments.runs import calibration
 
 SEEDS = "DEM_WARP_TEST_SEEDS"
 """Variable of the environment that names the file of the simulated seeds."""
@@ -35,6 +39,19 @@ def cone_engine(
         results.append(cone_of(angle))
         on_result(index, results[-1])
     return results
+
+
+def without_pages(patch: pytest.MonkeyPatch) -> None:
+    """Let a calibration leave its results and its card, without pictures and pages."""
+
+    def write_results(campaign: Any, study: Any, folder: Path, *_: Any, **__: Any) -> None:
+        results = json.dumps({"campaign": campaign.to_dict()})
+        (folder / "results.json").write_text(results, encoding="utf-8")
+        write_material_card(campaign, study, folder)
+
+    patch.setattr(calibration, "write_report", write_results)
+    patch.setattr(calibration, "heap_pictures", lambda *_: [])
+    patch.setattr(calibration, "verified_heap", lambda *_: None)
 
 
 def cone_of(angle: float) -> CaseResult:

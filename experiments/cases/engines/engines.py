@@ -11,7 +11,7 @@ from experiments.cases.engines.contract import command_program
 from experiments.cases.engines.driver import Driver
 from experiments.cases.engines.engine import Engine
 from experiments.cases.engines.program import ProgramEngine
-from experiments.io.errors import InputError, Problem, StudyError
+from experiments.io.errors import InputError, StudyError
 from experiments.studyfile import Study
 from experiments.studyfile.engine_section import EngineSection, quoted
 from experiments.studyfile.solver_section import CARD_SOLVER, OWN_SOLVER
@@ -77,7 +77,7 @@ def engine_of(study: Study) -> Engine | None:
             check(study.case({}, seed=0))
         except InputError as error:
             # each on its own line: a code may lack more than one thing
-            found = (Problem(place, problem.problem, problem.value) for problem in error.problems)
+            found = (replace(problem, place=place) for problem in error.problems)
             raise StudyError.of(found) from None
         except ValueError as error:
             raise StudyError(place, f"cannot run this study: {error}", section.name) from None

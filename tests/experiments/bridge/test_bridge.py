@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from cone_engine import SEEDS, cone_engine
+from cone_engine import SEEDS, cone_engine, without_pages
 from typer.testing import CliRunner
 
 from doe import Factor, Sample, central_composite, fit_surface
@@ -47,6 +47,7 @@ def card(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(engines._DRIVERS, "cones", cone_engine)
         patch.setenv(SEEDS, str(folder / "seeds.txt"))
+        without_pages(patch)
         api.calibrate(study, folder / "out", device="cpu", engine="cones")
     return folder / "out" / "material.toml"
 

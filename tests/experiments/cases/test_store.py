@@ -70,22 +70,18 @@ def with_moved_spheres(case: Case, shape: ClumpShape, move: Callable[[float], fl
 TRIPLET = ClumpShape.from_spheres([[0, 0, 0], [1.3e-3, 0, 0], [0.5e-3, 0.8e-3, 0]], [1e-3, 0.9e-3, 0.8e-3])
 
 
-@pytest.mark.parametrize("toward", [-np.inf, np.inf])
-def test_last_bits_of_a_shape_make_no_other_key(tmp_path: Path, small_study: Study, toward: float) -> None:
+def test_last_bits_of_a_shape_make_no_other_key(tmp_path: Path, small_study: Study) -> None:
     store, case = Store(tmp_path), small_study.case({}, seed=1)
     exact = with_moved_spheres(case, TRIPLET, lambda x: x)
-    last_bit = with_moved_spheres(case, TRIPLET, lambda x: np.nextafter(x, toward))
+    last_bit = with_moved_spheres(case, TRIPLET, lambda x: np.nextafter(x, np.inf))
     assert exact.grains.shape != last_bit.grains.shape
     assert store.key(exact) == store.key(last_bit)
 
 
-@pytest.mark.parametrize("place", [(0, 0), (1, 1), (2, 2)])
-def test_a_sphere_moved_by_a_billionth_of_the_size_makes_another_key(
-    tmp_path: Path, small_study: Study, place: tuple[int, int]
-) -> None:
+def test_a_sphere_moved_by_a_billionth_makes_another_key(tmp_path: Path, small_study: Study) -> None:
     store, case = Store(tmp_path), small_study.case({}, seed=1)
     centers = TRIPLET.centers.copy()
-    centers[place] += 1e-9 * TRIPLET.bounding_radius
+    centers[1, 1] += 1e-9 * TRIPLET.bounding_radius
     moved = dataclasses.replace(TRIPLET, centers=centers)
     keys = [
         store.key(dataclasses.replace(case, grains=dataclasses.replace(case.grains, shape=shape)))
@@ -105,12 +101,12 @@ def test_an_absent_case_is_absent(tmp_path: Path) -> None:
     store = Store(tmp_path / "new")
     assert not store.has("k")
     assert store.damage("k") is None
-    with pytest.raises(StoreError, match="must stay until the run has ended"):
+    with pytest.raises(StoreError, match="this stored case was removed"):
         store.load("k")
     assert not store.folder.exists()
 
 
-@pytest.mark.parametrize("at", [0.0, 0.1, 0.5, 0.9, 0.999])
+@pytest.mark.parametrize("at", [0.0, 0.5, 0.999])
 def test_a_file_cut_short_is_named_and_not_read(tmp_path: Path, cone: Cone, at: float) -> None:
     store = Store(tmp_path)
     store.save("k", cone())
@@ -138,7 +134,7 @@ def test_what_has_finished_has_finite_places(tmp_path: Path, cone: Cone, value: 
     positions = whole.positions.copy()
     positions[0, 2] = value
     store.save("k", dataclasses.replace(whole, positions=positions))
-    assert "no finite numbers" in (store.damage("k") or "")
+    assert "not finite" in (store.damage("k") or "")
     diverged = dataclasses.replace(whole, positions=positions, status="diverged", reason="too fast")
     store.save("k", diverged)
     assert store.has("k")
@@ -181,7 +177,7 @@ def test_the_error_of_a_full_disk_names_the_file(tmp_path: Path) -> None:
 def test_a_used_folder_is_refused_untouched(tmp_path: Path, small_study: Study) -> None:
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     before = files_of(tmp_path)
-    with pytest.raises(StoreError, match="new or empty"):
+    with pytest.raises(StoreError, match="the folder is not empty"):
         open_folder(tmp_path, small_study)
     with pytest.raises(StoreError, match=r"study\.json"):
         open_folder(tmp_path, small_study, resume=True)
@@ -189,11 +185,8 @@ def test_a_used_folder_is_refused_untouched(tmp_path: Path, small_study: Study) 
 
 
 def test_a_folder_is_resumed_by_the_same_study(tmp_path: Path, small_study: Study) -> None:
-    folder = tmp_path / "out"
-    _, changes = open_folder(folder, small_study)
-    assert changes == []
-    _, changes = open_folder(folder, small_study, resume=True)
-    assert changes == []
+    for resume in (False, True):
+        assert open_folder(tmp_path / "out", small_study, resume)[1] == []
 
 
 def test_a_changed_study_is_noticed_and_every_change_named(tmp_path: Path, write_study: WriteStudy) -> None:
@@ -210,16 +203,6 @@ def test_a_changed_study_is_noticed_and_every_change_named(tmp_path: Path, write
         "study.numerics.modulus_scale: 400.0 -> 1.0",
         "study.target.n: 5 -> 6",
     ]
-
-
-def test_a_changed_clump_is_noticed(tmp_path: Path, write_study: WriteStudy) -> None:
-    clump = tmp_path / "clump.txt"
-    clump.write_text("0 0 0 1\n1 0 0 1\n", encoding="utf-8")
-    path = write_study(('sphere = "2 mm"', 'clump = "clump.txt"'))
-    open_folder(tmp_path / "out", load_study(path))
-    clump.write_text("0 0 0 1\n1.5 0 0 1\n", encoding="utf-8")
-    [change] = open_folder(tmp_path / "out", load_study(path), resume=True)[1]
-    assert change.startswith("clump_sha256")
 
 
 def test_a_changed_clump_of_several_is_noticed(tmp_path: Path, write_study: WriteStudy) -> None:

@@ -152,9 +152,7 @@ def _problem_with_grains(path: Path) -> Problem:
     with pytest.raises(StudyError) as caught:
         load_study(path).case({"E": 0.5}, 1)
     [problem] = caught.value.problems
-    assert re.fullmatch(
-        r"must (be|have) at most [\d,]+ grains .*: lower grain_count, or .*", problem.problem
-    )
+    assert re.fullmatch(r"must (be|have) at most [\d,]+ grains .*: lower grain_count, or .*", problem.problem)
     assert "got" not in problem.problem
     return problem
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commandline import dem_warp
-from cone_engine import SEEDS, cone_engine
+from cone_engine import SEEDS, cone_engine, without_pages
 
 from experiments.cases import execute
 from experiments.cases.engines import engines
@@ -23,7 +23,6 @@ from experiments.cases.show import heap
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover import engine_simulator
 from experiments.measurement.case_observables import Observed
-from experiments.report.material_card import write_material_card
 from experiments.runs import bridging, calibration, one_heap, search
 
 LOADED = (bridging, calibration, one_heap, search)
@@ -130,10 +129,6 @@ class writes_counted:  # noqa: N801
 def _stand_ins(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Simulate and measure in no time, and write the results without a page."""
 
-    def write_results(campaign: Any, study: Any, folder: Path, *_: Any, **__: Any) -> None:
-        (folder / "results.json").write_text(json.dumps(campaign.to_dict()), encoding="utf-8")
-        write_material_card(campaign, study, folder)
-
     def observe(_: Any, result: Any, __: Any) -> Observed:
         return Observed({"angle": result.observables["truth"]}, SimpleNamespace(se=0.1))
 
@@ -146,9 +141,7 @@ def _stand_ins(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setattr(execute, "SAVE_EVERY", 0.0)
         patch.setattr(execute, "measuring_processes", lambda *_: Direct())
         patch.setattr(engine_simulator, "measure", measure)
-        patch.setattr(calibration, "write_report", write_results)
-        patch.setattr(calibration, "heap_pictures", lambda *_: [])
-        patch.setattr(calibration, "verified_heap", lambda *_: None)
+        without_pages(patch)
         patch.setattr(heap, "_write_pictures", lambda *_: None)
         patch.setenv(SEEDS, str(tmp_path_factory.mktemp("seeds") / "seeds.txt"))
         yield

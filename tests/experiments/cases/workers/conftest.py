@@ -1,4 +1,4 @@
-"""A cluster of two workers on this machine, for all tests of a module."""
+"""A cluster of two workers on this machine, for all tests."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from experiments.cases import Resources, Workers, open_workers
 from experiments.studyfile.cluster_section import ClusterSection
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def two_workers() -> Iterator[Workers]:
     """Two workers of Dask on the CPU."""
     with open_workers(Resources(cluster=ClusterSection(workers=2, gpu=False))) as workers:
