@@ -1,1 +1,1 @@
-"""The trail that a run leaves in its folder while it works: whoever can read it can watch the run."""
+"""The journal that a run keeps in its folder while it works: whoever can read it can watch the run."""

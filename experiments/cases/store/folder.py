@@ -55,7 +55,7 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
 
 
 def is_used(folder: Path) -> bool:
-    """Tell whether a folder, or a file of that name, holds anything of a run."""
+    """Return whether a folder, or a file of that name, holds anything of a run."""
     # pathlib raises where a name is too long for the system
     if not os.path.isdir(folder):
         return os.path.lexists(folder)

@@ -107,7 +107,7 @@ class Resources:
         return asked or cores
 
     def memory(self, cases: Sequence[Case], most: int) -> float:
-        """Predict the memory of this machine, or of each GPU, for at most so many such cases [bytes]."""
+        """Predict the memory of this machine, or of each GPU, for at most `most` such cases [bytes]."""
         if not cases:
             return 0.0
         largest = max(cases, key=lambda case: work_of(case).spheres)

@@ -122,7 +122,7 @@ def test_the_walls_stand_where_they_are(series: dict) -> None:
 
 def test_files_are_such_that_ovito_reads_them(filmed: Path) -> None:
     # Its reader knows no compression, and takes points for particles where each is a vertex and nothing
-    # stands before the piece.
+    # comes before the piece.
     files = [filmed / "filmed/heap.vtp", *(filmed / "filmed/frames").glob("*/*.vtp")]
     assert len(files) == 1 + len(SERIES) * COUNT
     for file in files:

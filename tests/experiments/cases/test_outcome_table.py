@@ -16,7 +16,7 @@ OUTCOMES = {
     f"{number:064x}": (np.array([number, np.nan, 0.1 * number]), "" if number % 3 else "no heap")
     for number in range(40)
 }
-FLIPS = 200
+FLIPS = 400
 
 
 @pytest.fixture

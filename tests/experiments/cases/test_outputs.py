@@ -65,7 +65,7 @@ def test_outputs_of_another_study_are_removed_and_other_files_stay(
     assert (folder / "report.html").read_text(encoding="utf-8") == study_hash(other)
 
 
-def test_outputs_of_the_same_stay_beside_new_ones(folder: Path, small_study: Study) -> None:
+def test_outputs_of_the_same_study_stay_with_new_ones(folder: Path, small_study: Study) -> None:
     publish(folder, small_study, "report.html", data="a")
     publish(folder, small_study, "record/page.md", data="a")
     assert {"report.html", "record/page.md"} < set(listed(folder)["files"])
@@ -90,7 +90,7 @@ def test_a_run_that_stops_leaves_the_earlier_outputs_as_they_were(
     assert {name: sha256_of(folder / name) for name in files_of(folder)} == before
 
 
-def test_a_run_that_stops_between_two_moves_is_mended_by_the_next(
+def test_a_run_that_stops_between_two_moves_is_put_right_by_the_next(
     folder: Path, small_study: Study, other: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     publish(folder, small_study, "a.txt", "b.txt", "c.txt")

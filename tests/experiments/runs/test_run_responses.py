@@ -98,7 +98,7 @@ class Engine:
 
 
 def observe(_: object, result: CaseResult, leaves_a_heap: bool) -> Observed:
-    """Take the angle that the stand-in engine tells of."""
+    """Take the angle that the stand-in engine reports."""
     seen = result.observables
     heap = {"angle": seen["truth"]} if leaves_a_heap else {}
     return Observed(seen | heap, SimpleNamespace(se=0.1) if heap else None)

@@ -46,7 +46,7 @@ def seeds_run(folder: Path) -> list[int]:
 # ---- what a program finds ----------------------------------------------------------------------------------
 
 
-def test_a_case_is_told_in_si_with_its_clump_and_its_walls(write_study: Write, tmp_path: Path) -> None:
+def test_a_case_is_written_in_si_with_its_clump_and_its_walls(write_study: Write, tmp_path: Path) -> None:
     clump = tmp_path / "pair.txt"
     clump.write_text("0 0 0 2\n3 0 0 1\n", encoding="utf-8")
     study = load_study(write_study(('sphere = "2 mm"', 'clump = "pair.txt"')))
@@ -234,7 +234,7 @@ def test_a_wrong_engine_is_refused_with_rule_and_place(
     assert place in caught.value.place
 
 
-def test_a_command_finds_files_beside_the_study_and_is_read_by_no_shell(
+def test_a_command_finds_files_next_to_the_study_and_is_read_by_no_shell(
     write_study: Write, tmp_path: Path
 ) -> None:
     (tmp_path / "solver.py").write_text("pass")

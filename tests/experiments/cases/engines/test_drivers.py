@@ -131,7 +131,7 @@ REAL = [
 
 
 def at_rest(result: CaseResult) -> bool:
-    """Tell that no sphere of a heap hangs: each stands on the plate or touches another."""
+    """Return whether no sphere of a heap hangs: each is on the plate or touches another."""
     centers, radii = result.sphere_centers, result.sphere_radii
     gaps = np.linalg.norm(centers[:, None] - centers[None], axis=2) - radii[:, None] - radii[None]
     np.fill_diagonal(gaps, np.inf)

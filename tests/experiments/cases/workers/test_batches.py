@@ -168,18 +168,18 @@ def test_an_error_of_the_caller_is_no_cases(
 # ---- progress ----------------------------------------------------------------------------------------------
 
 
-def test_progress_is_weighed_by_cost_and_told_from_the_start(
+def test_progress_is_weighed_by_cost_and_reported_from_the_start(
     cases: list[Case], cone: Callable[..., CaseResult]
 ) -> None:
     seen: list[Progress] = []
-    wave = CallResults(cases[:2], None, seen.append, expected=40.0)
-    wave.costs = np.array([3.0, 1.0])
-    wave.report()
-    wave.follow(0, [0, 1], Progress(0, 2, 0.5, {"fill": 2}, 1.0))
-    wave.take(0, cone())
-    wave.end(0)
-    wave.take(1, cone())
-    wave.report()
+    batch = CallResults(cases[:2], None, seen.append, expected=40.0)
+    batch.costs = np.array([3.0, 1.0])
+    batch.report()
+    batch.follow(0, [0, 1], Progress(0, 2, 0.5, {"fill": 2}, 1.0))
+    batch.take(0, cone())
+    batch.end(0)
+    batch.take(1, cone())
+    batch.report()
     assert [progress.fraction for progress in seen] == [0.0, 0.5, 0.875, 1.0]
     assert seen[0].phase_counts == {"waiting": 2}
     assert seen[1].phase_counts == {"fill": 2}

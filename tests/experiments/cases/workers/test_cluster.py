@@ -67,13 +67,13 @@ def test_workers_that_are_killed_lose_no_case_and_none_is_done_twice(
 ) -> None:
     cases = made(small_study, 4)
     assert isinstance(two_workers, DaskWorkers)
-    client, hear = two_workers._client, dask_workers._Session._hear
+    client, take = two_workers._client, dask_workers._Session._take_message
     received: Counter[int] = Counter()
     begun: list[int] = []
 
     def kill(session: dask_workers._Session, message: dask_task.Message) -> None:
-        """Hear what a worker says; as the third batch has just begun, kill all workers."""
-        hear(session, message)
+        """Take what a worker says; as the third batch has just begun, kill all workers."""
+        take(session, message)
         if message.reply:
             begun.append(message.number)
             if len(begun) == 3:
@@ -83,7 +83,7 @@ def test_workers_that_are_killed_lose_no_case_and_none_is_done_twice(
     def note(index: int, result: CaseResult) -> None:
         received[index] += 1
 
-    monkeypatch.setattr(dask_workers._Session, "_hear", kill)
+    monkeypatch.setattr(dask_workers._Session, "_take_message", kill)
     results = two_workers.simulate(cases, None, note, None, tmp_path / "unfinished")
     assert begun.count(begun[2]) > 1, "it was begun again"
     assert received == Counter(range(4))
@@ -185,7 +185,7 @@ def test_the_default_imports_no_dask(write_study: Callable[..., Path], tmp_path:
     [
         ("workers = 0", "greater than or equal to 1"),
         ('kind = "cloud"', "'local', 'slurm'"),
-        ('memory = "plenty"', 'a size with its unit, as "4 GB"'),
+        ('memory = "plenty"', 'a size with its unit, e.g. "4 GB"'),
         ('directives = ["-p main\\nrm -rf ~"]', "one line each"),
         ("worker = 2", "did you mean 'workers'?"),
         ('walltime = "30 s"', "greater than or equal to 60"),

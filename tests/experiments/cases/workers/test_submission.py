@@ -138,8 +138,8 @@ def test_a_run_whose_last_jobs_are_refused_ends(monkeypatch: pytest.MonkeyPatch)
 
     submissions = Submissions(1)
     queue = SimpleNamespace(get=nothing)
-    session: Any = SimpleNamespace(submissions=submissions, _queue=queue, wave=SimpleNamespace(report=int))
-    session._hear_all = threading.Event().set
+    session: Any = SimpleNamespace(submissions=submissions, _queue=queue, results=SimpleNamespace(report=int))
+    session._take_all = threading.Event().set
     dask_workers._Session._listen(session)
     submissions.refuse("a", RuntimeError("no more"))
     with pytest.raises(WorkersLostError, match="no more"):
