@@ -1,7 +1,5 @@
 """Figures of Markdown pages (matplotlib): one look, and the same bytes for the same data."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from matplotlib.axes import Axes

@@ -1,7 +1,5 @@
 """Pages of records in Markdown: parts, tables, facts and wall times."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Speed of columns of grains while filling, settled and lifting, beside what the memory allows.
+"""Speed of columns of grains while filling, settled and lifting, compared with what the memory allows.
 
 A sphere-step is one sphere of a grain moved on by one step. Grains of the rain that have yet to be released
 are moved on too, but meet nobody: `of free grains` leaves them out. The columns are simulated once and kept
@@ -8,8 +8,8 @@ are moved on too, but meet nobody: `of free grains` leaves them out. The columns
     python -m experiments.evidence.performance.heap_throughput --scale soft --peer lammps --peer yade
     python -m experiments.evidence.performance.heap_throughput --scale paper --device cuda --worlds 1,128
 
-Every table goes to `--out` as CSV, and all of them to throughput.md; those beside other codes to its folder
-peers and to peers.md. `record.py` puts both pages into README.md.
+Every table goes to `--out` as CSV, and all of them to throughput.md; comparisons with other codes go to
+its folder peers and to peers.md. `record.py` puts both pages into README.md.
 """
 
 from collections.abc import Iterator, Sequence

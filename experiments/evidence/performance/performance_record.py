@@ -19,7 +19,7 @@ def record_page(folder: Path, name: str, readme: Path, record: Path) -> None:
     """Put one benchmark's results, a Markdown page with tables and perhaps pictures, into the record.
 
     The page goes between the lines ``<!-- begin NAME -->`` and ``<!-- end NAME -->`` of the readme. Tables
-    and pictures go to the folder `record` beside it; their suffix is what follows the first dash of NAME.
+    and pictures go to the folder `record` next to it; their suffix is what follows the first dash of NAME.
     """
     pages = sorted(folder.glob("*.md"))
     if len(pages) != 1:

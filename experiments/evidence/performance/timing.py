@@ -59,7 +59,7 @@ def run_in(solver: Solver, duration: float = RUN_IN) -> None:
 
 
 def time_steps(solver: Solver, steps: int, stretches: int = STRETCHES) -> Timing:
-    """Time stretches of at least so many steps."""
+    """Time stretches of at least n steps."""
     chunks = math.ceil(steps / CHUNK)
     free, rebuilds = [_free_grains(solver)], solver.rebuilds.numpy().mean()
     seconds = []

@@ -3,8 +3,6 @@
 Each code runs the test that `dem-warp export` writes for it, under its own laws, which dem-warp takes too.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

@@ -8,8 +8,6 @@ campaign of 20 small cases. Every fourth run is also started a second time in th
 refused. It needs Linux.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import random

@@ -4,8 +4,6 @@ Debian's packages slurm-wlm and munge are needed, and rights to start daemons. N
 touched: configuration, keys, logs and state lie in the folder, the daemons end with the block.
 """
 
-from __future__ import annotations
-
 import getpass
 import os
 import secrets

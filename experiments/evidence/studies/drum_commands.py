@@ -1,7 +1,5 @@
 """Command line that the studies of drums share: run the study, write the page of a run."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated

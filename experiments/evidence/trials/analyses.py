@@ -4,8 +4,6 @@ Each analysis is a generator that yields points and is sent their outcomes. They
 that the statistics of a round take every core; the simulator stays in this process.
 """
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

@@ -6,8 +6,6 @@ Where all are the same, the bank's file names today's engine as its maker, so th
 A bank that was made on a GPU must be looked at on a GPU, where floats are rounded otherwise than on a CPU.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated

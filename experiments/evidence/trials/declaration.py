@@ -1,7 +1,5 @@
 """Declarations before a trial is drawn: which mechanisms the data should show, and from which size on."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -18,6 +16,7 @@ from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import Block
 from doe.discrepancy.fitting.model_fit import weigh
+from experiments.evidence.trials.truth import read_sealed_json
 from experiments.evidence.trials.truths import Declared, Plan
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
@@ -45,32 +44,32 @@ class Declaration:
     """Date."""
     plan: Plan
     settings: Settings
-    """Of the analysis; what it may name is declared in it."""
+    """Settings of the analysis; they declare what it may name."""
     library: tuple[Declared, ...]
     """Mechanisms with their detectable sizes, with the plan's replicates."""
-    strangers: tuple[Declared, ...]
+    outside: tuple[Declared, ...]
     """Mechanisms that the library never has."""
 
     def write(self, path: Path) -> None:
         """Write it as JSON."""
         document = asdict(self) | {"settings_sha256": self.settings.sha256}
-        for effect in (*document["library"], *document["strangers"]):
+        for effect in (*document["library"], *document["outside"]):
             effect["detectable"] = effect["detectable"] if math.isfinite(effect["detectable"]) else None
         write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
 def read_declaration(path: Path) -> Declaration:
     """Read what `Declaration.write` wrote."""
-    document = json.loads(path.read_text(encoding="utf-8"))
+    document = read_sealed_json(path)
     sha256 = document.pop("settings_sha256")
     settings = document.pop("settings")
     resolvable = settings.pop("resolvable")
     fixed = Settings(**settings, resolvable=None if resolvable is None else tuple(resolvable))
     if fixed.sha256 != sha256:
         raise InputError(str(path), f"settings must have the hash {sha256}", fixed.sha256)
-    library, strangers = (tuple(map(_effect, document.pop(name))) for name in ("library", "strangers"))
+    library, outside = (tuple(map(_effect, document.pop(name))) for name in ("library", "outside"))
     plan = Plan(**document.pop("plan"))
-    return Declaration(**document, plan=plan, settings=fixed, library=library, strangers=strangers)
+    return Declaration(**document, plan=plan, settings=fixed, library=library, outside=outside)
 
 
 def _effect(record: dict[str, Any]) -> Declared:
@@ -87,12 +86,12 @@ def declared_effects(
     observables: Collection[str] = NAMES,
     calibration: Mapping[str, Calibration] | None = None,
 ) -> tuple[Declared, ...]:
-    """Declare what so many replicates of every condition should show of each mechanism of the library.
+    """Declare what replicates of every condition should show of each mechanism of the library.
 
     They show the observables that are named: a bank may know more, as outlines; and are off in all conditions
     alike by no more than a calibration has, by observable.
     The power is the mean over the ranges of the factors, as truths are drawn from all of them. A mechanism
-    is told apart that the end of its range shows nearly everywhere in them.
+    is distinct if the end of its range shows nearly everywhere in them.
     """
     space = emulator.space
     drawn, correlations = [], []
@@ -116,8 +115,8 @@ def declared_effect(
     """Declare a mechanism of some power, (points, `power.CODED_SIZES`), in the ranges of the factors."""
     coded = detectable_coded_size(powers.mean(axis=0), settings)
     detectable = abs(span.natural(coded) - span.null) if math.isfinite(coded) else math.inf
-    told = math.isfinite(detectable_coded_size(np.quantile(powers, BLIND, axis=0), settings))
-    return Declared(span.name, span.null, span.maximum, detectable, told, kin)
+    distinct = math.isfinite(detectable_coded_size(np.quantile(powers, BLIND, axis=0), settings))
+    return Declared(span.name, span.null, span.maximum, detectable, distinct, kin)
 
 
 def with_names(settings: Settings, library: Sequence[Declared]) -> Settings:
@@ -132,7 +131,7 @@ def perfect_means(
     observables: Collection[str],
     calibration: Mapping[str, Calibration],
 ) -> tuple[Block, ...]:
-    """Means of so many replicates in every training condition that are exactly the model's at coded theta."""
+    """Means of replicates in every training condition that are exactly the model's at coded theta."""
     numbers = np.flatnonzero(np.isin(emulator.observables, list(observables)))
     means = [
         Block.of_means(condition, numbers, surfaces.predict(theta[None], ())[0][numbers], replicates)
@@ -143,7 +142,7 @@ def perfect_means(
 
 
 def _kin(names: Sequence[str], correlations: np.ndarray) -> dict[str, tuple[str, ...]]:
-    """By mechanism: those that look like it after calibration."""
+    """Mechanisms that look alike after calibration, by mechanism."""
     return {
         name: tuple(other for j, other in enumerate(names) if j != i and correlations[i, j] > KIN)
         for i, name in enumerate(names)

@@ -57,10 +57,10 @@ class Finding:
     size: float = math.nan
     size_low: float = math.nan
     size_high: float = math.nan
-    """Of the first named mechanism, with its 90 % interval; NaN where none is named."""
+    """Size of the first named mechanism, with its 90 % interval; NaN if no mechanism is named."""
     q: float = math.nan
     degrees_of_freedom: float = math.nan
-    """Of the base."""
+    """P value of the base."""
     held_out_before: float = math.nan
     held_out_after: float = math.nan
     """Q of the held-out conditions without and with the mechanism, from fresh runs; NaN without."""

@@ -11,8 +11,6 @@ be published before the fourth runs, and the labels into FOLDER/hidden, where no
 writes the file of measured heaps of every trial into FOLDER/data; interrupted, it goes on where it was.
 """
 
-from __future__ import annotations
-
 import secrets
 import time
 from collections.abc import Sequence
@@ -60,7 +58,7 @@ from experiments.studyfile import Study, load_study
 STUDY = Path(__file__).parents[2] / "studies" / "trial" / "study.toml"
 """The study that the trials are about."""
 
-STRANGERS = {path.stem: path for path in Path(__file__).parent.glob("outside/*.toml")}
+OUTSIDE = {path.stem: path for path in Path(__file__).parent.glob("outside/*.toml")}
 """Effects that the library never has, written as its mechanisms are."""
 
 STEP_SHARE = 0.8
@@ -92,11 +90,11 @@ def generators_study(scale: str) -> Study:
 
 
 def seal_trials(
-    folder: Folder, search: Search, bank: Bank, plan: Plan, seed: int, strangers: Sequence[Declared]
+    folder: Folder, search: Search, bank: Bank, plan: Plan, seed: int, outside: Sequence[Declared]
 ) -> None:
     """Declare what the trials should show, draw the truths, and write seals and labels.
 
-    The seed of the drawing must not be known to whoever knows the plan; the library never has the strangers.
+    The seed of the drawing must not be known to whoever knows the plan; `outside` is never in the library.
     """
     if folder.sealed.exists():
         raise InputError(str(folder.sealed), "the folder has sealed trials", hint="Choose another folder.")
@@ -105,7 +103,7 @@ def seal_trials(
     emulator, known = fit_emulator(bank), stated_scales(seen)
     library = declared_effects(emulator, search.settings, plan.replicates, seen, known)
     today, settings = time.strftime("%Y-%m-%d"), with_names(search.settings, library)
-    scale, foreign = study.scale or "", tuple(strangers)
+    scale, foreign = study.scale or "", tuple(outside)
     declaration = Declaration(study.name, scale, today, plan, settings, library, foreign)
     rng = np.random.default_rng(seed)
     trials = draw(plan, study.factors, library, foreign, rng, lambda: rng.bytes(16).hex())
@@ -119,7 +117,7 @@ def measure_trials(
 ) -> None:
     """Simulate all heaps of some trials in one call, and write each trial's file.
 
-    The simulator knows the library and the strangers.
+    The simulator knows the library and what is outside it.
     """
     conditions = [condition.name for condition in load_study(STUDY, declaration.scale or None).conditions]
     waves = [cases_of(label, conditions, declaration.plan.replicates) for label in labels]
@@ -129,7 +127,7 @@ def measure_trials(
 
 @app.command(name="bank")
 def make(
-    file: Annotated[Path, typer.Argument(help="File of the bank; its cases are kept beside it.")],
+    file: Annotated[Path, typer.Argument(help="File of the bank; its cases are kept next to it.")],
     scale: Annotated[str, typer.Option(help="Scale of the trial study; left out: as written.")] = "",
     points: Annotated[int | None, typer.Option(help="Of the base; left out: as the study says.")] = None,
     mechanism_points: Annotated[int | None, typer.Option(help="Of each effect; left out: so, too.")] = None,
@@ -182,8 +180,8 @@ def seal(
         numbers = Plan(**read_toml(plan)[1]) if plan else Plan()
         place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
         waves = search.read_bank(bank or bank_beside(scale))
-        strangers = [Declared(m.name, m.null, m.maximum) for m in library_for(search.study, STRANGERS)]
-        seal_trials(place, search, waves, numbers, secrets.randbits(63) if seed is None else seed, strangers)
+        outside = [Declared(m.name, m.null, m.maximum) for m in library_for(search.study, OUTSIDE)]
+        seal_trials(place, search, waves, numbers, secrets.randbits(63) if seed is None else seed, outside)
         print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
 
 
@@ -201,7 +199,7 @@ def measure(
         sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
         labels = list(revealed(read_labels(place.hidden_labels), sealed).values())
         study = generators_study(declaration.scale)
-        library = (*library_for(study), *library_for(study, STRANGERS))
+        library = (*library_for(study), *library_for(study, OUTSIDE))
         table = OutcomeTable(place.hidden / "outcomes.sqlite")
         with (
             open_workers(Resources(device, workers)) as simulators,

@@ -7,8 +7,6 @@ The second writes the page again from the files of the record. The measured heap
 to the record, as they took hours; those of the engine with ``--heaps``, so that other methods can use them.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -8,8 +8,6 @@ again, and the others take what was simulated from the table of outcomes. The ex
 not ended.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import time
@@ -66,7 +64,7 @@ def run_trials(
 ) -> None:
     """Run the analyses of some sealed trials that have not ended, one in each view; report every round.
 
-    There are as many processes for analyses as `workers` of the simulator. After so many seconds no further
+    There are as many processes for analyses as `workers` of the simulator. After `seconds` no further
     batch is begun.
     """
     deadline = time.monotonic() + seconds
@@ -93,7 +91,7 @@ def run_trials(
 
 
 def chosen(trials: Sequence[Sealed], part: str | None = None, every: int = 1) -> list[Sealed]:
-    """Pick the trials of a part, None for all, and of each part one of so many, by their numbers."""
+    """Pick the trials of a part, None for all, and of each part every n-th, by their numbers."""
     picked = [trial for trial in trials if part in (None, trial.part)]
     return [trial for trial in picked if int(trial.trial.rpartition("-")[2]) % every == 0]
 
@@ -102,7 +100,7 @@ def main(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
     bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
-    every: Annotated[int, typer.Option(help="One trial of so many, by their numbers.", min=1)] = 1,
+    every: Annotated[int, typer.Option(help="Take every n-th trial, by their numbers.", min=1)] = 1,
     view: Annotated[str | None, typer.Option(help="Left out: the plan's, and photographs.")] = None,
     device: Annotated[str | None, typer.Option(help="cpu, cuda, or several GPUs, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,

@@ -1,7 +1,5 @@
 """The score of the analysis: findings against the revealed truths, and both against what was aimed at."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -67,7 +65,7 @@ class Aim:
     found: str
     """With its interval."""
     passed: bool | None
-    """None where too few trials ran to say."""
+    """True if the aim is met, None if too few trials ran."""
 
 
 def scored(findings: pd.DataFrame, labels: Mapping[str, Label], sealed: Sequence[Sealed]) -> pd.DataFrame:
@@ -168,7 +166,7 @@ def by_mechanism(table: pd.DataFrame) -> pd.DataFrame:
 
 def by_outsider(table: pd.DataFrame) -> pd.DataFrame:
     """For each effect that may not be named: its trials and how they ended."""
-    outside = table[table["kind"].isin([Kind.UNRESOLVED, Kind.WITHHELD, Kind.STRANGER])]
+    outside = table[table["kind"].isin([Kind.UNRESOLVED, Kind.WITHHELD, Kind.OUTSIDE])]
     hidden = outside["truth"] + " (" + outside["kind"] + ")"
     return pd.crosstab(hidden, outside["verdict"], rownames=["effect"], colnames=[None])
 
@@ -198,7 +196,7 @@ def aims(table: pd.DataFrame, unresolvable: Sequence[str]) -> tuple[Aim, ...]:
     """
     kind, verdict = table["kind"], table["verdict"]
     nulls, pairs, strong = table[kind == Kind.NULL], table[kind == Kind.PAIR], strong_singles(table)
-    unknown = verdict[kind.isin([Kind.WITHHELD, Kind.STRANGER])] == Verdict.UNKNOWN
+    unknown = verdict[kind.isin([Kind.WITHHELD, Kind.OUTSIDE])] == Verdict.UNKNOWN
     names = table.loc[verdict == Verdict.NAMED, "named"].str.split()
     forbidden = names.map(lambda these: bool(set(these) & set(unresolvable))).astype(bool)
     above, outside, two = "one mechanism above 1.5 gamma80", "outside the library", "two mechanisms"
@@ -225,7 +223,7 @@ def foreign_aims(table: pd.DataFrame) -> tuple[Aim, ...]:
     """Hold one view's trials against what was aimed at where another code makes the heaps."""
     kind, verdict = table["kind"], table["verdict"]
     nulls, pairs, strong = table[kind == Kind.NULL], table[kind == Kind.PAIR], strong_singles(table)
-    unknown = verdict[kind.isin([Kind.WITHHELD, Kind.STRANGER])] == Verdict.UNKNOWN
+    unknown = verdict[kind.isin([Kind.WITHHELD, Kind.OUTSIDE])] == Verdict.UNKNOWN
     above, outside, two = "one mechanism above 1.5 gamma80", "outside the library", "two mechanisms"
     return (
         _limit("nothing hidden: alarms", "at most 2 in 40", nulls["alarm"], most=0.05),
@@ -250,7 +248,7 @@ def unknown_area(table: pd.DataFrame) -> str:
     if not table["misfit"].notna().any():
         return ""
     strong = pd.concat([strong_singles(table), table[table["kind"] == Kind.PAIR]])
-    foreign = table[table["kind"].isin([Kind.WITHHELD, Kind.STRANGER])]
+    foreign = table[table["kind"].isin([Kind.WITHHELD, Kind.OUTSIDE])]
     scores = (rows["misfit"].astype(float).fillna(-np.inf).to_numpy() for rows in (foreign, strong))
     return area_text(*scores)
 
@@ -311,9 +309,15 @@ def auroc(positive: np.ndarray, negative: np.ndarray) -> float:
     """Return the probability that a positive score is the larger; ties count half (Mann and Whitney 1947)."""
     if not len(positive) or not len(negative):
         return float("nan")
-    ranks = stats.rankdata(np.concatenate([positive, negative]))
-    above = ranks[: len(positive)].sum() - len(positive) * (len(positive) + 1) / 2.0
-    return float(above / (len(positive) * len(negative)))
+    return float(_areas(positive, negative))
+
+
+def _areas(positive: np.ndarray, negative: np.ndarray) -> np.ndarray:
+    """Areas of classes along the last axis."""
+    first, second = positive.shape[-1], negative.shape[-1]
+    ranks = stats.rankdata(np.concatenate([positive, negative], axis=-1), axis=-1)
+    above = ranks[..., :first].sum(axis=-1) - first * (first + 1) / 2.0
+    return np.asarray(above / (first * second))
 
 
 def area_text(positive: np.ndarray, negative: np.ndarray) -> str:
@@ -321,8 +325,7 @@ def area_text(positive: np.ndarray, negative: np.ndarray) -> str:
     if not len(positive) or not len(negative):
         return "no trials"
     rng = np.random.default_rng(0)
-    drawn = [
-        auroc(rng.choice(positive, len(positive)), rng.choice(negative, len(negative))) for _ in range(DRAWS)
-    ]
-    low, high = np.quantile(drawn, [0.025, 0.975])
+    classes = (positive, negative)
+    drawn = [[rng.choice(each, len(each)) for each in classes] for _ in range(DRAWS)]
+    low, high = np.quantile(_areas(*map(np.array, zip(*drawn, strict=True))), [0.025, 0.975])
     return f"{auroc(positive, negative):.3f} ({low:.2f} to {high:.2f})"

@@ -1,4 +1,4 @@
-"""The camera of the trials: what a real photograph adds to a heap, beside what the analysis reckons with."""
+"""The camera of the trials: what a real photograph adds to a heap, beyond what the analysis assumes."""
 
 from __future__ import annotations
 

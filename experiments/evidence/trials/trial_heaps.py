@@ -1,7 +1,5 @@
 """The heaps of a trial: its cases, and its measurements as a user would write them down."""
 
-from __future__ import annotations
-
 import csv
 import lzma
 import tarfile
@@ -27,7 +25,7 @@ LARGEST = 1_000_000
 
 
 def cases_of(label: Label, conditions: Sequence[str], replicates: int) -> list[Point]:
-    """Cases of a trial: so many replicates of each condition, each with a seed of its own."""
+    """Cases of a trial: replicates of each condition, each with a seed of its own."""
     tested = [condition for condition in conditions for _ in range(replicates)]
     seeds = np.random.SeedSequence(label.seed).generate_state(len(tested)) >> 1
     return [

@@ -1,7 +1,5 @@
 """The folder of the trials: what is published, what is hidden, what was measured and found."""
 
-from __future__ import annotations
-
 import csv
 import time
 from collections.abc import Iterator
@@ -15,7 +13,7 @@ from experiments.evidence.machine import machine
 DECLARED, SEALED, LABELS = "declared.json", "sealed.csv", "labels.json"
 FINDINGS, RUNS, NOTES, PAGE = "findings.csv", "runs.csv", "notes.md", "README.md"
 REALITY, HEAPS = "reality.json", "heaps.tar.xz"
-"""Files of a record; labels are there of what has been analysed, notes where something is to be said beside,
+"""Files of a record; labels are there of what has been analysed, notes where there is more to say,
 the reality where another code made the heaps, and these where they are kept."""
 
 

@@ -1,8 +1,5 @@
 """The record of the trials: tables, pictures and one page, written from its own files."""
 
-from __future__ import annotations
-
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,7 +36,7 @@ from experiments.evidence.trials.trials_folder import (
     RUNS,
     SEALED,
 )
-from experiments.evidence.trials.truth import opened, read_labels, read_sealed, revealed
+from experiments.evidence.trials.truth import opened, read_labels, read_sealed, read_sealed_json, revealed
 from experiments.evidence.trials.truths import STRONG
 
 TITLES = {
@@ -115,7 +112,7 @@ def read_record(folder: Path) -> Record:
     findings, sealed = read_findings([folder / FINDINGS]), read_sealed(folder / SEALED)
     truths = revealed(read_labels(folder / LABELS), opened(sealed, findings["trial"]))
     reality = folder / REALITY
-    made_by = json.loads(reality.read_text(encoding="utf-8")) if reality.is_file() else None
+    made_by = read_sealed_json(reality) if reality.is_file() else None
     return Record(read_declaration(folder / DECLARED), scored(findings, truths, sealed), len(sealed), made_by)
 
 
@@ -137,9 +134,7 @@ def write_trials_page(folder: Path) -> Path:
 def _made(reality: dict[str, Any]) -> str:
     """Say how another code makes each effect."""
     rows = [{"effect": name, "made by": text} for name, text in reality["library"].items()]
-    strange = [
-        {"outside the library": name, "what it is": text} for name, text in reality["strangers"].items()
-    ]
+    strange = [{"outside the library": name, "what it is": text} for name, text in reality["outside"].items()]
     text = f"## How {reality['name']} makes it\n\n{reality['laws']}.\n\n{markdown_table(pd.DataFrame(rows))}"
     return f"{text}\n{markdown_table(pd.DataFrame(strange))}"
 
@@ -160,7 +155,7 @@ def _declared(declared: Declaration) -> str:
             "maximum": effect.maximum,
             "gamma80, from the null": effect.detectable,
             "of the range": effect.detectable / abs(effect.maximum - effect.null),
-            "told apart": "yes" if effect.told_apart else "no",
+            "distinct": "yes" if effect.told_apart else "no",
             "resolvable": "yes" if effect.resolvable else "no",
             "looks like": ", ".join(effect.kin),
         }
@@ -170,7 +165,7 @@ def _declared(declared: Declaration) -> str:
     stated = (
         f"{declared.study}{scale}, {declared.plan.replicates} heaps a condition; declared and sealed on "
         f"{declared.drawn_on}; settings of the analysis {declared.settings.sha256}. A mechanism is "
-        f"resolvable that is told from every other, and whose range holds more than {STRONG:g} gamma80; no "
+        f"resolvable if it is distinct from every other and its range holds more than {STRONG:g} gamma80; no "
         "other may be named."
     )
     aim = _aims([declared_aim(declared.library)])
@@ -195,8 +190,8 @@ def _view(record: Record, view: str, heading: str, folder: Path) -> list[str]:
         parts += ["### Effects that may not be named", markdown_table(outside.reset_index())]
     if area := unknown_area(rows):
         parts.append(
-            "By the misfit of the closest model what the library lacks is told from one or two strong effects"
-            f" of it with an area under the curve of {area}."
+            "By the misfit of the closest model what the library lacks is separated from one or two strong "
+            f"effects of it with an area under the curve of {area}."
         )
     return parts
 

@@ -4,8 +4,6 @@ A truth is drawn, sealed by a hash that is published before anything is simulate
 Whoever holds the revealed labels can check every seal: the salt makes a seal impossible to guess.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json
@@ -17,6 +15,9 @@ from typing import Any
 
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
+
+SEALED_WORDS = json.loads(Path(__file__).with_name("sealed_words.json").read_text(encoding="utf-8"))
+"""Words of the sealed files by the words of the code: a seal holds every letter of its label."""
 
 
 class Kind(StrEnum):
@@ -30,7 +31,7 @@ class Kind(StrEnum):
     """One of the library that was declared not resolvable, and may not be named."""
     WITHHELD = "withheld"
     """One mechanism that the analysis does not have in its library, nor any of its like."""
-    STRANGER = "stranger"
+    OUTSIDE = SEALED_WORDS["outside"]
     """An effect that the library never has."""
     PAIR = "pair"
     """Two mechanisms of the library."""
@@ -112,6 +113,12 @@ def write_labels(path: Path, labels: Sequence[Label]) -> None:
 def read_labels(path: Path) -> tuple[Label, ...]:
     """Read what `write_labels` wrote."""
     return tuple(_label(record) for record in json.loads(path.read_text(encoding="utf-8")))
+
+
+def read_sealed_json(path: Path) -> Any:
+    """Read a declaration or another file of a record, in the words of the code."""
+    text = path.read_text(encoding="utf-8")
+    return json.loads(text.replace(f'"{SEALED_WORDS["outside"]}s"', '"outside"'))
 
 
 def opened(sealed: Sequence[Sealed], analysed: Iterable[str]) -> list[Sealed]:

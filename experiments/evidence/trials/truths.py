@@ -1,7 +1,5 @@
 """Drawing the hidden truths of the trials."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
@@ -21,7 +19,7 @@ WEAK = 0.3
 """Least size of a weak trial, in detectable ones."""
 
 UPPER = 0.5
-"""Strangers have at least this part of their range."""
+"""Effects outside the library have at least this part of their range."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +35,10 @@ class Plan:
     """A mechanism that was declared not resolvable, anywhere in its range."""
     withheld: int = 5
     """A resolvable mechanism, strong, which the analysis must do without."""
-    strangers: int = 7
+    outside: int = 7
     """An effect that the library never has."""
     pairs: int = 30
-    """Of two resolvable mechanisms, both strong."""
+    """Trials of two resolvable mechanisms, both strong."""
     replicates: int = 8
     """Heaps a condition."""
     mechanisms: tuple[str, ...] = ()
@@ -69,8 +67,8 @@ class Declared:
     maximum: float
     """Its range."""
     detectable: float = math.inf
-    """Distance from the null that is found and told from every other with 80 % probability; infinite where
-    the range has none."""
+    """Distance from the null that is found and distinguished from every other with 80 % probability; infinite
+    where the range has no such size."""
     told_apart: bool = True
     """True if the data tell it, at the end of its range, from every other, nearly everywhere in the ranges of
     the factors."""
@@ -84,11 +82,11 @@ class Declared:
 
     @property
     def resolvable(self) -> bool:
-        """True if it may be named: it is told apart, and its range has strong sizes."""
+        """True if it may be named: it is distinct, and its range has strong sizes."""
         return self.told_apart and self.strongest > STRONG
 
     def size(self, multiple: float) -> float:
-        """Size of so many detectable ones."""
+        """Size of a multiple of the detectable one."""
         return self.null + math.copysign(multiple * self.detectable, self.maximum - self.null)
 
 
@@ -107,7 +105,7 @@ def draw(
     plan: Plan,
     factors: Sequence[Factor],
     library: Sequence[Declared],
-    strangers: Sequence[Declared],
+    outside: Sequence[Declared],
     rng: np.random.Generator,
     salt: Callable[[], str],
 ) -> tuple[tuple[Label, Sealed], ...]:
@@ -115,12 +113,12 @@ def draw(
 
     Theta is uniform in the ranges of the factors, the size of a mechanism in its own part of its range.
     Within each part ("alone", "outside", "pairs") the trials are shuffled, so that a name says nothing. The
-    analysis knows the mechanisms of the library, and never the strangers.
+    analysis knows the mechanisms of the library, and never those outside it.
     """
     if foreign := set(plan.mechanisms) - {effect.name for effect in library}:
         raise InputError("Plan.mechanisms", "must be mechanisms of the library", sorted(foreign))
     library = [effect for effect in library if not plan.mechanisms or effect.name in plan.mechanisms]
-    drafts = [*_alone(plan, library, rng), *_outside(plan, library, strangers, rng)]
+    drafts = [*_alone(plan, library, rng), *_outside(plan, library, outside, rng)]
     drafts += _pairs(plan, [effect for effect in library if effect.resolvable], rng)
     trials = []
     for part in dict.fromkeys(draft.part for draft in drafts):
@@ -154,7 +152,7 @@ def _alone(plan: Plan, library: Sequence[Declared], rng: np.random.Generator) ->
 
 
 def _outside(
-    plan: Plan, library: Sequence[Declared], strangers: Sequence[Declared], rng: np.random.Generator
+    plan: Plan, library: Sequence[Declared], outside: Sequence[Declared], rng: np.random.Generator
 ) -> Iterator[_Draft]:
     """Trials of what the analysis does not have in its library."""
     for effect in library:
@@ -162,12 +160,12 @@ def _outside(
             for _ in range(plan.withheld):
                 draft = _strong("outside", Kind.WITHHELD, effect, rng)
                 yield replace(draft, withheld=tuple(sorted({effect.name, *effect.kin})))
-    for effect in strangers:
-        yield from (_somewhere("outside", Kind.STRANGER, effect, rng, UPPER) for _ in range(plan.strangers))
+    for effect in outside:
+        yield from (_somewhere("outside", Kind.OUTSIDE, effect, rng, UPPER) for _ in range(plan.outside))
 
 
 def _pairs(plan: Plan, resolvable: Sequence[Declared], rng: np.random.Generator) -> Iterator[_Draft]:
-    """Two mechanisms that can be told apart."""
+    """Two mechanisms that can be distinguished."""
     partners = [(one, other) for one, other in combinations(resolvable, 2) if other.name not in one.kin]
     if plan.pairs and not partners:
         raise InputError("Plan.pairs", "pairs need two resolvable mechanisms", [e.name for e in resolvable])

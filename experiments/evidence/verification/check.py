@@ -60,9 +60,7 @@ def _worst_row(
 def order_row(
     problem: str, case: str, quantity: str, steps: ArrayLike, errors: ArrayLike, expected: float, least: float
 ) -> Row:
-    """Row of an order of convergence: the slope of errors against steps; `least` is the lowest that
-    passes.
-    """
+    """Row of an order of convergence: the slope of errors against steps, at least `least`."""
     slope = -float(np.polyfit(np.log(np.asarray(steps, float)), np.log(np.asarray(errors, float)), 1)[0])
     shortfall = max(expected - slope, 0.0)
     reference = f"order {expected:g} of the scheme, {least:g} at the least"

@@ -21,7 +21,7 @@ COLUMNS = (
     "chapter", "problem", "case", "quantity", "reference", "expected", "simulated", "error", "relative",
     "tolerance", "verdict",
 )  # fmt: skip
-"""Of the table of rows."""
+"""Columns of the table of rows."""
 
 STYLES = {"points": "o", "dashed": "--", "line": "-"}
 """Formats of curves."""

@@ -1,7 +1,5 @@
 """A column of the benchmarks that the tests of the evidence share."""
 
-from __future__ import annotations
-
 import pytest
 
 from dem_warp import LiftedCylinder

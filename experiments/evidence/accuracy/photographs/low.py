@@ -3,8 +3,6 @@
 python -m experiments.evidence.accuracy.photographs.low --first 980000 --heaps 60
 """
 
-from __future__ import annotations
-
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 from itertools import count, islice

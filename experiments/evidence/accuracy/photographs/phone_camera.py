@@ -1,7 +1,5 @@
 """A phone's camera before a heap: perspective, height, tilt and lens, from points to pixels and back."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +13,11 @@ class PhoneCamera:
 
     columns: int
     rows: int
-    """Of the picture."""
+    """Width and height of the picture."""
     distance: float = 6.0
-    """From the heap's axis, along the plate, in heap radii."""
+    """Distance from the heap's axis, along the plate, in heap radii."""
     elevation: float = 0.0
-    """Of the camera over the plate, seen from the heap's foot [degrees]."""
+    """Elevation of the camera over the plate, seen from the heap's foot [degrees]."""
     share: float = 0.5
     """Share of the columns that the heap covers."""
     tilt: float = 0.0

@@ -1,7 +1,5 @@
 """Heaps of grains to be photographed: spheres on a plate, in units of the heap's radius."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +27,7 @@ class GrainHeap:
     jitter: float = 0.15
     """Standard deviation of the grains' height over the cone, in diameters."""
     strays: int = 0
-    """Grains that lie beside the heap."""
+    """Number of grains that lie around the heap."""
     seed: int = 0
 
     @property
@@ -38,7 +36,7 @@ class GrainHeap:
         return float(np.tan(np.radians(self.angle)) * (1.0 - 0.5 * self.rounding))
 
     def surface(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Height of the smooth heap over points of the plate; below zero beside it."""
+        """Height of the smooth heap over points of the plate; below zero around it."""
         radius = np.hypot(x, y)
         cosine = np.divide(x, radius, out=np.zeros_like(radius), where=radius > 0)
         slope = np.tan(np.radians(self.angle - 0.5 * self.lean * cosine))
@@ -57,9 +55,9 @@ class GrainHeap:
         depth = rng.uniform(0.0, DEPTH * self.grain * steep, count)
         depth -= rng.normal(0.0, self.jitter * self.grain, count)
         z = self.surface(x, y) - 0.5 * self.grain * steep - depth
-        beside = rng.uniform(1.02, 1.35, self.strays)
+        distance = rng.uniform(1.02, 1.35, self.strays)
         turn = rng.uniform(0.0, 2.0 * np.pi, self.strays)
-        x, y = np.r_[x, beside * np.cos(turn)], np.r_[y, beside * np.sin(turn)]
+        x, y = np.r_[x, distance * np.cos(turn)], np.r_[y, distance * np.sin(turn)]
         z = np.r_[z, np.full(self.strays, 0.4 * self.grain)]
         # Grains lie on the plate, not in it.
         kept = z > 0.1 * self.grain

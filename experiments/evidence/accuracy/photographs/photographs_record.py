@@ -6,8 +6,6 @@ Seeds below 1000, 800000 to 800299 and those of earlier series were used while t
 are for others. What a person notes in `notes.md` of the record's folder stands on its page.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 from collections import Counter
@@ -55,7 +53,7 @@ def with_heap(seed: int) -> tuple[Row, Picture]:
 
 
 def in_hard_light(seed: int) -> tuple[Row, Picture]:
-    """Return the same for a heap that throws a sharp shadow on the wall beside it."""
+    """Return the same for a heap that throws a sharp shadow on the wall next to it."""
     return row_of(photograph_in_hard_light(seed), seed)
 
 

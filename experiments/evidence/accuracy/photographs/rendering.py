@@ -1,6 +1,4 @@
-"""From a heap, its surroundings, a lamp and a camera to a picture as a phone would store it."""
-
-from __future__ import annotations
+"""Render a heap, its surroundings and a lamp as a picture that a phone would store."""
 
 from dataclasses import dataclass
 
@@ -57,7 +55,7 @@ class Surroundings:
     thickness: float = 50.0
     """The table's top reaches from -half_width to half_width, and from -near to far [heap radii]."""
     wall_distance: float = 4.0
-    """Of the wall behind the heap."""
+    """Colour of the wall behind the heap."""
     texture: float = 0.0
     """Relative standard deviation of the table's and the wall's pattern."""
 
@@ -177,7 +175,7 @@ def sharp_shadow(
     spheres: tuple[FloatArray, FloatArray],
     camera: PhoneCamera,
 ) -> Layer:
-    """Share of a small lamp, 0 to 1, that the grains hide from each place beside the heap or behind it.
+    """Share of a small lamp, 0 to 1, that the grains hide from each place around the heap or behind it.
 
     The grains are drawn as the lamp sees them; each place looks there whether one is in its way.
 
@@ -213,7 +211,7 @@ def sharp_shadow(
     blur = max(softness * 0.5 * camera.share * camera.columns * FINE, 0.5)
     hidden = cv2.GaussianBlur(view, (0, 0), blur).astype(np.float32) / 255.0
     turned = ((place - lamp.astype(np.float32)) @ axes.T.astype(np.float32)).astype(np.float32)
-    # What lies beside the lamp or behind it sees no heap in its way.
+    # Places level with the lamp or behind it see no heap in its way.
     before = np.maximum(turned[..., 2:], 0.1)
     at = ((turned[..., :2] / before - low) * pixels).astype(np.float32)
     return np.asarray(cv2.remap(hidden, at[..., 0], at[..., 1], cv2.INTER_LINEAR), dtype=np.float32)

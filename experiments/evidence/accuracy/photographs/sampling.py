@@ -1,7 +1,5 @@
 """Photographs with a heap, drawn at random: one seed, one picture with its truth."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +22,7 @@ class Photograph:
 
     picture: Picture
     truth: ReposeAngle
-    """Of the same grains' exact outline, seen level and from afar."""
+    """Angle of the same grains' exact outline, seen level and from afar."""
     setting: str
     """One of `SETTINGS`."""
     camera: PhoneCamera
@@ -39,7 +37,7 @@ def photograph(seed: int) -> Photograph:
 
 
 def photograph_in_hard_light(seed: int) -> Photograph:
-    """Draw a photograph whose heap casts a sharp shadow on the near wall and the plate, beside a flank."""
+    """Draw a photograph whose heap casts a sharp shadow on the near wall and the plate, next to a flank."""
     return _shot(np.random.default_rng([22, seed]), seed, hard=True)
 
 
@@ -159,7 +157,7 @@ def _lamp(rng: np.random.Generator) -> Lamp:
 
 
 def _hard_lamp(rng: np.random.Generator, heap: GrainHeap, behind: float) -> Lamp:
-    """One or two flashes or bare bulbs, each throwing the tip's shadow on the wall beside the heap."""
+    """One or two flashes or bare bulbs, each throwing the tip's shadow on the wall next to the heap."""
     tip = np.array([0.0, 0.0, heap.height])
     side = float(rng.choice([-1.0, 1.0]))
     places = []

@@ -1,7 +1,5 @@
 """Pictures without a heap, drawn at random: what else ends up in a folder of photographs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import cv2

@@ -1,7 +1,5 @@
 """Agreement: the misfit without noise, its bias, slope and rank correlation, at few runs and many."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -29,7 +27,7 @@ SPREAD = 6.0
 """Standard deviation of the true reference over the misfit."""
 
 TRIALS = 40_000
-"""Of slope and rank correlation an eighth."""
+"""Allowed difference of slope and rank correlation: an eighth."""
 
 ROUNDING = 1e-12
 

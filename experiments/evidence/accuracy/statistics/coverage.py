@@ -1,7 +1,5 @@
 """One figure of the record: what is stated, how often it held, and in how many trials."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,13 +8,13 @@ import numpy as np
 import pandas as pd
 
 SEED = 20240
-"""Of every theme, with the number of the case: each case can be repeated alone."""
+"""Seed of every theme, joined with the number of the case: each case can be repeated alone."""
 
 SLACK = 0.01
 """A figure of .95 holds from .94 to .96, "at least .95" from .94 on; a level of .05 from .04 to .06."""
 
 ERRORS = 2.0
-"""Standard errors by which a share may lie outside: so many trials do not say that the figure is wrong."""
+"""Standard errors by which a share may lie outside: by chance, not by a wrong figure."""
 
 EXACT, AT_LEAST, AT_MOST = "exact", "at least", "at most"
 PROMISES = (EXACT, AT_LEAST, AT_MOST)
@@ -61,7 +59,7 @@ class Figure:
 
 
 CHECKED = 20
-"""Trials of every case that go through `doe` itself, beside the vectorised computation of all of them."""
+"""Trials of every case that go through `doe` itself, next to the vectorised computation of all."""
 
 
 def require_same(figure: str, found: object, expected: object, near: float = 1e-6) -> None:

@@ -1,7 +1,5 @@
 """Comparisons of means, equivalence and the noise floor: how often they are wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

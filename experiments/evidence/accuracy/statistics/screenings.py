@@ -1,7 +1,5 @@
 """Screening: how often an inert factor is found significant, with and without an interaction."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

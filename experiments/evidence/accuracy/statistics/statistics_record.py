@@ -1,7 +1,5 @@
 """Record of levels and coverage: `python -m experiments.evidence.accuracy.statistics.statistics_record`."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path

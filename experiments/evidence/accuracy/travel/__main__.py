@@ -8,8 +8,6 @@ The page of the last recorded run is record/README.md. Every heap is stored as i
 are taken up, and any part may be run anywhere: what was made from the same input is not made again.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Ten cards: five grains from spheres to elongated and angular clumps, each with two frictions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,11 +42,11 @@ FINER_STEPS = {
 at it and do not come to rest. At a tenth they do."""
 
 SEEDS = (1, 2, 3, 4, 5)
-"""Of the heaps in each code."""
+"""Seeds of the heaps in each code."""
 FRESH_SEEDS = tuple(range(6, 21))
-"""Of the heaps on both sides that alone decide a cell that `SEEDS` have not shown."""
+"""Seeds of the heaps on both sides that alone decide a cell that `SEEDS` have not shown."""
 OWN_SEEDS = tuple(range(1, 21))
-"""Of ours: they cost little, and their mean should not blur the comparison."""
+"""Seeds of our heaps: they cost little, and their mean should not blur the comparison."""
 
 
 def _shapes() -> dict[str, ClumpShape]:

@@ -170,7 +170,7 @@ def run_theirs(
     workers: int,
     programs: Path | None,
 ) -> None:
-    """Run in other codes what is not stored yet, so many at once and all cards of a seed before the next.
+    """Run in other codes what is not stored yet, several at once and all cards of a seed before the next.
 
     The programs may lie in a folder.
     """
@@ -212,8 +212,8 @@ def _run_one(folder: Path, programs: Path | None, code: str, card: str, seed: in
         said = next((line.strip() for line in reversed(lines) if line.strip()), "the program said nothing")
         heap = made(angle=None, grain_count=0, height=0.0, reason=f"no heap: {said[-TAIL:]}")
     heap.write(folder)
-    told = heap.reason or f"{heap.angle:.2f} degrees"
-    print(f"{code} {card} {seed}: {told}, {seconds:.0f} s", flush=True)
+    result = heap.reason or f"{heap.angle:.2f} degrees"
+    print(f"{code} {card} {seed}: {result}, {seconds:.0f} s", flush=True)
 
 
 def _input_key(translation: Translation) -> str:

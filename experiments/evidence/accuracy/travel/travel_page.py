@@ -1,7 +1,5 @@
 """Page of the proof: for each card and code, both means and whether they are shown to be equal."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -175,6 +173,6 @@ def _verdict(cells: pd.DataFrame) -> str:
         group = cells[cells["code"] == code]
         waiting = int((group["equivalent"] == NOT_RUN).sum())
         if waiting:
-            told = f"{waiting} of its {len(group)} cells have not been run"
-            lines.append(f"**{why}, and waits for one: {told}.**")
+            state = f"{waiting} of its {len(group)} cells have not been run"
+            lines.append(f"**{why}, and waits for one: {state}.**")
     return "\n\n".join(lines)

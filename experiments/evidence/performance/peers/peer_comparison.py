@@ -100,6 +100,6 @@ def _summary(table: pd.DataFrame, ours: Solver, theirs: PeerRun) -> str:
 
 
 def _kinetic_energy(solver: Solver) -> float:
-    """Of the translation in the first world [J]."""
+    """Kinetic energy of the translation in the first world [J]."""
     view = solver.view([0])[0]
     return float(0.5 * view.masses[view.alive] @ (view.velocities[view.alive] ** 2).sum(axis=1))

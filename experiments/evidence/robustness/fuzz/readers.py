@@ -4,8 +4,6 @@ A reader takes a file and returns what it holds, or raises an error of bad input
 what is read from a mutated one must be what was written.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -108,7 +106,7 @@ def measured(folder: Path) -> Reader:
 
 
 def profiles(folder: Path) -> Reader:
-    """Profiles of drums and of heaps, these with a picture beside."""
+    """Profiles of drums and of heaps, heaps with a picture."""
     (folder / "heap.png").write_bytes(_picture(".png"))
     rows = [f"{n},{x} mm,{n - 0.3 * x:.1f} mm" for n in (1, 2, 3) for x in range(-18, 19, 6)]
     heap = [f"1,,{x} mm,{max(9 - 0.5 * abs(x), 0):.1f} mm,," for x in range(-20, 21, 4)]
@@ -229,13 +227,13 @@ def preview(folder: Path) -> Reader:
     [result] = simulate([_case()], "cpu", 1)
     Previews(folder / "previews").write("seed", result, {"phase": "lift", "fraction": 0.5})
     content = (folder / "previews" / "seed.npz").read_bytes()
-    spheres, told = read_preview(folder / "previews" / "seed.npz")
+    spheres, notes = read_preview(folder / "previews" / "seed.npz")
 
     def read(path: Path) -> dict[str, Any]:
         found, words = read_preview(path)
         return {"spheres": found, **words}
 
-    facts = {"spheres": spheres, **told}
+    facts = {"spheres": spheres, **notes}
     return Reader({"seed.npz": content}, read, (ValueError,), checked=True, facts=facts)
 
 

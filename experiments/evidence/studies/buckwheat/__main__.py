@@ -6,8 +6,6 @@ Each of the paper's stages is one batch. The page is ``record/README.md`` in the
 runs the campaign of the study in the same folder, and the page compares both.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

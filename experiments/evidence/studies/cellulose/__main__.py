@@ -8,8 +8,6 @@ The first needs a GPU, and a quarter of an hour on an H200; the second is a coar
 third writes the page of a run. What a folder holds is not simulated again: a run that was stopped goes on.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from experiments.evidence.studies.drum_commands import drum_commands

@@ -1,7 +1,5 @@
 """Campaign of the study: a wide design, a second one about what it found, and repeats of the best point."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The fit of the measured edges: emulators of the simulated ones, generalised least squares, forecasts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulated drums of the study: each kept with its edge over time, and never simulated twice."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 
@@ -90,7 +88,7 @@ def with_curves(table: pd.DataFrame, folder: Path) -> tuple[pd.DataFrame, dict[f
 
 
 def write_curves(path: Path, table: pd.DataFrame, curves: dict[float, np.ndarray]) -> None:
-    """Write averaged edges beside their drums: all that a later fit needs."""
+    """Write averaged edges next to their drums: all that a later fit needs."""
     x = 1e3 * places()
     names = [f"{value:.3f}" for value in x]
     frames = []

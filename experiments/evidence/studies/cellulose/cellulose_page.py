@@ -1,7 +1,5 @@
 """Page of a run of the study: residuals, compatible region, and measured and simulated edges together."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -107,11 +105,11 @@ def _beside_the_source(residuals: pd.DataFrame) -> str:
     areas = residuals.pivot_table("area_mm2", ["stage", "point"], "rpm")
     smaller = areas < pd.Series(PUBLISHED_AREA)
     best = smaller.loc["check"].all()
-    told = ", ".join(f"{'smaller' if best[rpm] else 'larger'} at {rpm}/min" for rpm in MEASURED)
+    change = ", ".join(f"{'smaller' if best[rpm] else 'larger'} at {rpm}/min" for rpm in MEASURED)
     count = int(smaller.all(axis=1).sum())
     return (
-        f"At the best settings the area is {told} than the source's best. Of the {len(areas)} settings that "
-        f"were simulated, {count or 'none'} had a smaller one at every one of these speeds."
+        f"At the best settings the area is {change} than the source's best. Of the {len(areas)} settings "
+        f"that were simulated, {count or 'none'} had a smaller one at every one of these speeds."
     )
 
 

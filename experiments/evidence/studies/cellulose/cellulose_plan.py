@@ -1,7 +1,5 @@
 """Plan of the study: what is measured, what is varied, and how many drums are simulated."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cache
@@ -24,7 +22,7 @@ READING = 0.2
 """Standard deviation of reading the edge of an averaged picture [mm]: a tenth of the edge's width."""
 
 EVERY = 10
-"""Of so many measured places one takes part in the fit: nearer ones share their errors."""
+"""Every n-th measured place takes part in the fit: nearer ones share their errors."""
 
 FILL = Factor("fill", 0.21, 0.30)
 """Volume of the grains over that of the drum: the number of grains, at any size of theirs."""
@@ -57,7 +55,7 @@ class Runs:
 
 
 RUNS = {"h200": Runs(17, 12, 1), "bench": Runs(12, 8, 1)}
-"""By scale of the study."""
+"""Values by scale of the study."""
 
 
 def study_at(scale: str) -> Study:

@@ -9,8 +9,6 @@ The first needs a GPU; the second has small drums for two cores; the third write
 fourth a study and a table for `dem-warp discover`. What a folder holds is not simulated again.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from experiments.commands.console import clear_errors

@@ -1,7 +1,5 @@
 """Campaign of the study: drums of a wide design, their fit, and heaps at compatible settings."""
 
-from __future__ import annotations
-
 import json
 import time
 from pathlib import Path
@@ -46,13 +44,13 @@ def run_study(scale: str, folder: Path, device: str | None = None, workers: int 
     runs, machine, store = RUNS[scale], OwnWorkers(device, workers), Store(folder / "cases")
     walls: list[dict[str, Any]] = []
 
-    def simulated(study: Study, table: pd.DataFrame, stage: str, told: tuple[str, ...]) -> pd.DataFrame:
+    def simulated(study: Study, table: pd.DataFrame, stage: str, responses: tuple[str, ...]) -> pd.DataFrame:
         print(f"{stage}: {len(table)} cases", flush=True)
         began = time.perf_counter()
         found = run_cases(study, table, store, machine)
         seconds = round(time.perf_counter() - began, 1)
         walls.append({"stage": stage, "simulated": len(table), "seconds": seconds})
-        kept = found.reindex(columns=[*table.columns, *told])
+        kept = found.reindex(columns=[*table.columns, *responses])
         write_text(folder / f"{stage}.csv", kept.to_csv(index=False, float_format="%.6g"))
         return kept
 

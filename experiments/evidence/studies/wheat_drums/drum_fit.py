@@ -65,10 +65,10 @@ class WheatFit:
     """Coded `SETTINGS`, as likely as one another."""
     best: np.ndarray
     chi2: float
-    """At the best settings."""
+    """Values at the best settings."""
 
     def foretold(self, seed: int = 0) -> pd.DataFrame:
-        """Set each datum beside what the compatible settings say of it: the best, and its range [deg]."""
+        """Compare each datum with what the compatible settings predict: the best, and its range [deg]."""
         means, variances = self.slopes.predict(self.settings)
         drawn = means + np.random.default_rng(seed).normal(size=means.shape) * np.sqrt(variances)
         low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
@@ -98,8 +98,8 @@ class WheatFit:
             low, middle, high = (factor.center + factor.half_range * end for end in ends[:, number])
             part = (ends[2, number] - ends[0, number]) / 2.0
             best = factor.center + factor.half_range * self.best[number]
-            told = {"best": best, "low": low, "middle": middle, "high": high, "part of the design": part}
-            rows.append({"setting": name, **told, "open": "yes" if part > OPEN else "no"})
+            values = {"best": best, "low": low, "middle": middle, "high": high, "part of the design": part}
+            rows.append({"setting": name, **values, "open": "yes" if part > OPEN else "no"})
         return pd.DataFrame(rows)
 
 

@@ -1,7 +1,5 @@
 """Page of a run of the study: what the data pin down, what they foretell, and the heap."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -23,7 +21,7 @@ PAGE, PICTURE = "README.md", "slopes.png"
 
 
 def fit_of(folder: Path) -> tuple[Study, WheatFit, dict[str, Any]]:
-    """Fit all data with the drums of a run; its study and its facts beside."""
+    """Fit all data with the drums of a run; return its study and its facts, too."""
     require_run(folder, FACTS, DRUMS, HEAPS)
     facts = json.loads((folder / FACTS).read_text(encoding="utf-8"))
     study = study_at(facts["scale"])

@@ -1,7 +1,5 @@
 """Plan of the study: five data on one grain, and the drums that are simulated for them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,7 +41,7 @@ class Runs:
 
 
 RUNS = {"h200": Runs(16, 16), "bench": Runs(9, 6)}
-"""By scale of the study."""
+"""Values by scale of the study."""
 
 
 def study_at(scale: str) -> Study:

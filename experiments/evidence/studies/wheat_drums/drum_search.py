@@ -1,10 +1,8 @@
-"""A study and a table for `dem-warp discover`: does one set of the grain explain the inclined drums?
+"""A study and a table for `dem-warp discover`, to ask if one set of the grain explains the inclined drums.
 
 The walls have the frictions that the fit gave them, and the grain is open. The level test takes no part: its
 single angles are not published.
 """
-
-from __future__ import annotations
 
 from pathlib import Path
 

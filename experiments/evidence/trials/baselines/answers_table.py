@@ -1,7 +1,5 @@
 """Answers as they are kept: one file a method, one row a trial, added to as trials end."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import fields
 from pathlib import Path

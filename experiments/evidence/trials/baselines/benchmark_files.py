@@ -1,10 +1,8 @@
 """The files of the benchmark of model criticism, and their loader.
 
-`README.md` beside them says what they hold. The answers are a file of their own, so that nobody opens them
+Their `README.md` describes them. The answers are a file of their own, so that nobody opens them
 by chance.
 """
-
-from __future__ import annotations
 
 import json
 import zlib
@@ -48,9 +46,9 @@ class Benchmark:
 
     banks: tuple[Bank, ...]
     rules: tuple[Settings, ...]
-    """By bank: the settings of the search, with what it may name."""
+    """Settings of the search by bank, with what it may name."""
     libraries: tuple[tuple[Declared, ...], ...]
-    """By bank: its mechanisms with their detectable sizes."""
+    """Mechanisms by bank, with their detectable sizes."""
     trials: tuple[Posed, ...]
 
     def __post_init__(self) -> None:

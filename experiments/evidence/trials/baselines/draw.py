@@ -6,8 +6,6 @@ The emulator of the shipped bench bank, bent by what no polynomial follows, is t
 drawn from it. Any first part of the trials is balanced: they come in rounds of each kind, the banks in turn.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -62,16 +60,16 @@ def fresh_runs(points: Sequence[Point]) -> Outcomes:
 
 def round_of(library: Sequence[Declared], number: int, rng: np.random.Generator) -> Iterator[Hidden]:
     """Draw one round of trials: kinds, mechanisms and multiples."""
-    told = [effect for effect in library if effect.resolvable]
+    named = [effect for effect in library if effect.resolvable]
     yield from ((Kind.NULL, ()) for _ in range(NULLS))
-    for index, effect in enumerate(told):
+    for index, effect in enumerate(named):
         within = [multiple for multiple in MULTIPLES if multiple <= effect.strongest]
         yield Kind.SINGLE, ((effect, within[(number + index) % len(within)]),)
-    apart = [(one, other) for one, other in combinations(told, 2) if other.name not in one.kin]
+    apart = [(one, other) for one, other in combinations(named, 2) if other.name not in one.kin]
     pair = apart[rng.integers(len(apart))]
     yield Kind.PAIR, tuple((effect, _strong(effect, rng)) for effect in pair)
     for turn in range(WITHHELD):
-        effect = told[(WITHHELD * number + turn) % len(told)]
+        effect = named[(WITHHELD * number + turn) % len(named)]
         yield Kind.WITHHELD, ((effect, _strong(effect, rng)),)
 
 
@@ -94,7 +92,7 @@ def trial_of(
 
 
 def draw_benchmark(banks: int, rounds: int, seed: int) -> tuple[Benchmark, list[Label]]:
-    """Draw banks, and so many rounds of trials with each."""
+    """Draw banks, and rounds of trials with each."""
     truth, settings = true_world()
     drawn, rules, libraries = [], [], []
     for number in range(banks):

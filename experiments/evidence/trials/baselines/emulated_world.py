@@ -5,8 +5,6 @@ noise, and the analysis have the emulator of that; bent by what no polynomial fo
 quite in the reach of the second.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from zlib import crc32

@@ -4,8 +4,6 @@ for problem in measured_problems(Path("experiments/evidence/trials/record/sevent
     answer = method(problem)
 """
 
-from __future__ import annotations
-
 import tempfile
 import zlib
 from collections.abc import Iterator
@@ -55,7 +53,7 @@ def opened_trials(place: Path) -> Iterator[Folder]:
 
 
 def measured_problems(place: Path, bank: Path | None = None, count: int | None = None) -> Iterator[Problem]:
-    """Pose the first so many trials that have heaps, as the search has them in the view of their plan.
+    """Pose the first trials that have heaps, as the search has them in the view of their plan.
 
     The seed is the search's. Left out, the bank is that of the scale.
     """

@@ -1,7 +1,5 @@
 """Pictures of the record of the methods: curves of their scores, and their power."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The methods by name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from experiments.evidence.trials.baselines.methods.bayes_factors import BayesFactors

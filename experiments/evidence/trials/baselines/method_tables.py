@@ -1,7 +1,5 @@
 """Answers of several methods to the same trials, against the truth and against one another."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +12,7 @@ from experiments.evidence.trials.score import POWER_EDGES, Share, area_text, sha
 from experiments.evidence.trials.truth import Kind, Label
 from experiments.evidence.trials.truths import STRONG
 
-FOREIGN = (Kind.WITHHELD, Kind.STRANGER)
+FOREIGN = (Kind.WITHHELD, Kind.OUTSIDE)
 """Kinds of trials whose hidden effect is not in the library."""
 
 

@@ -1,7 +1,5 @@
 """The protocol of a method: what it is given of a trial, and what it answers."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -32,9 +30,9 @@ class Answer:
     """Answer of a method to one trial."""
 
     score: float
-    """Of the alarm: the larger, the surer that something is missing."""
+    """Score of the alarm: the larger, the surer that something is missing."""
     alarm: bool
-    """At the method's declared level."""
+    """Alarm at the method's declared level."""
     named: Mechanisms = ()
     """Mechanisms that it names, sorted; without an alarm none."""
     tied: bool = False
@@ -57,12 +55,12 @@ class Problem:
 
     trial: str
     emulator: Emulator
-    """Of the bank, without what is withheld."""
+    """Mechanisms of the bank, without what is withheld."""
     measured: Measured
     settings: Settings
-    """Of the search; of these the others take the systematic part of the errors."""
+    """Settings of the search; from these the others take the systematic part of the errors."""
     seed: int
-    """Of a method's own draws."""
+    """Seed of a method's own draws."""
     _fits: dict[Mechanisms, Fitted] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property

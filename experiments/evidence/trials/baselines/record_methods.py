@@ -8,8 +8,6 @@ The second is for measured trials, a folder of them or their record, with what t
 answers. The last writes the page again from the files of the record; it includes records in its folders.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -56,9 +54,9 @@ Every method gets the same bank of runs and the same heaps of all conditions. It
 alarm, an alarm at the level that it declares, names or none, and, if it has one, a score that what is missing
 is not in the library. Only the *search* may ask the simulator for fresh runs; *search, bank alone* may not.
 Hidden is nothing, one mechanism of the library at several multiples of its detectable size (*one effect*
-below: of 1.5 or more), two of these, or what is not in the library: one that was taken out of it, or a
-stranger. *Wrong* is a name of what is not hidden. Seconds are of one core; fits of models count with the
-method that first asks for them.
+below: of 1.5 or more), two of these, or what is not in the library: one that was taken out of it, or an
+effect that it never had. *Wrong* is a name of what is not hidden. Seconds are of one core; fits of models
+count with the method that first asks for them.
 """
 
 AREAS = """## Areas under the curves
@@ -85,7 +83,7 @@ The search may name only what was declared resolvable beforehand ({0}).
 Here the other methods are held to it, too: an answer with any other name is taken as *unknown*.
 """
 
-BESIDE = """## On other heaps
+OTHER_HEAPS = """## On other heaps
 
 The same methods on other heaps, whose records are linked. *Wrong names* are of all trials; *right answer*:
 trials in which only the {0} is right : only the method, with McNemar's exact p value, of those trials where
@@ -204,7 +202,7 @@ def _beside(record: Path, table: pd.DataFrame, reference: str) -> list[str]:
         return []
     links = {f"[{place.name}]({place.name}/{PAGE})": read_record(place) for place in places}
     found = side_by_side({"emulated": table} | links, reference)
-    return [BESIDE.format(reference), markdown_table(found)]
+    return [OTHER_HEAPS.format(reference), markdown_table(found)]
 
 
 def _declared(names: list[str]) -> pd.DataFrame:

@@ -7,8 +7,6 @@ TRIALS is a folder of trials or a record with its heaps; what the search found t
 Answers are kept as trials end; the same command continues.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator, Mapping
@@ -29,7 +27,7 @@ from experiments.io.errors import InputError
 
 
 def emulated_problems(folder: Path, count: int | None) -> Iterator[Problem]:
-    """Pose the first so many trials of a benchmark."""
+    """Pose the first trials of a benchmark."""
     benchmark = load_benchmark(folder)
     for trial in benchmark.trials[:count]:
         yield benchmark.problem(trial)
@@ -71,7 +69,7 @@ def main(
     names: Annotated[
         str, typer.Option("--methods", help="Names parted by ';'; left out: all installed.")
     ] = "",
-    count: Annotated[int | None, typer.Option(help="First so many trials; left out: all.", min=1)] = None,
+    count: Annotated[int | None, typer.Option(help="Number of trials. Default: all.", min=1)] = None,
     seconds: Annotated[float, typer.Option(help="Begin nothing after this time.")] = math.inf,
 ) -> None:
     """Let the methods answer what they have not answered."""

@@ -1,7 +1,5 @@
 """Records of the same methods on different heaps, side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Effects of the trials in other codes: those that the library lacks, and how its own are made there."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -28,7 +26,7 @@ LOGNORMAL_CLASSES = 7
 
 
 @dataclass(frozen=True)
-class Stranger:
+class OutsideEffect:
     """An effect that the library lacks.
 
     It has a size, and no unit that a study knows: `change` makes it.
@@ -88,25 +86,25 @@ def _normal_quantile(share: float) -> float:
     return float(ndtri(share))
 
 
-STRANGERS: Mapping[str, Stranger] = {
-    "conical_tube": Stranger(
+OUTSIDE: Mapping[str, OutsideEffect] = {
+    "conical_tube": OutsideEffect(
         "The tube narrows upwards; half the angle of its cone, in degrees.", 0.0, 3.0, _taper
     ),
-    "lognormal_sizes": Stranger(
+    "lognormal_sizes": OutsideEffect(
         "Sizes are spread lognormally at the same mean mass; deviation of their logarithm.", 0.05, 0.5,
         _lognormal,
     ),
-    "slick_plate": Stranger(
+    "slick_plate": OutsideEffect(
         "The plate rubs less than the tube, save one of known friction; part of the friction that is gone.",
         0.0, 0.9, _slick,
     ),
-    "slippery_class": Stranger(
+    "slippery_class": OutsideEffect(
         f"Some grains have {SLIPPERY:g} of the others' friction; part of the number.", 0.0, 0.5, _slippery
     ),
-    "soft_class": Stranger(
+    "soft_class": OutsideEffect(
         f"{SOFT_SHARE:g} of the grains are softer; modulus of the others over theirs.", 1.0, 200.0, _soft
     ),
-    "turning_tube": Stranger(
+    "turning_tube": OutsideEffect(
         "The tube turns about its axis while it is lifted; radians a second.", 0.0, 60.0, _turn
     ),
 }  # fmt: skip
@@ -116,5 +114,5 @@ Half of each range leaves a gap, with every observable, in heaps that LIGGGHTS m
 factors, eight of 100 grains a condition: trials draw from the upper half.
 """
 
-DECLARED = tuple(Declared(name, each.null, each.maximum) for name, each in STRANGERS.items())
+DECLARED = tuple(Declared(name, each.null, each.maximum) for name, each in OUTSIDE.items())
 """The same, as they are declared."""

@@ -1,7 +1,5 @@
 """Other codes as programs that make the heaps of a trial."""
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 from collections.abc import Callable, Mapping, Sequence
@@ -30,8 +28,8 @@ from experiments.evidence.trials.other_codes.liggghts_trials import liggghts_fil
 from experiments.io.errors import InputError
 from experiments.studyfile.observables import OBSERVABLES, PHOTOGRAPHED
 
-TOLD = tuple(each.name for each in OBSERVABLES if each.name not in PHOTOGRAPHED)
-"""Observables that a film and a balance tell."""
+REPORTED = tuple(each.name for each in OBSERVABLES if each.name not in PHOTOGRAPHED)
+"""Observables that a film and a balance report."""
 
 INPUT = "lift.in"
 
@@ -54,7 +52,7 @@ class OtherCode:
     @property
     def observables(self) -> tuple[str, ...]:
         """Observables of the test that a film and a balance tell."""
-        return TOLD
+        return REPORTED
 
     def answers(self, case: Case) -> tuple[str, ...]:
         """Name the film and the balance."""
@@ -99,7 +97,7 @@ TIME_LIMIT = 1800.0
 
 
 def engine_for(code: str, workers: int | None = None) -> ProgramEngine:
-    """Engine that runs a code, so many heaps at once."""
+    """Engine that runs several heaps of a code at once."""
     if code not in CODES:
         raise InputError("--code", f"must be one of {', '.join(CODES)}", code)
     return ProgramEngine(CODES[code], workers, TIME_LIMIT)

@@ -1,7 +1,5 @@
 """Another code as the simulator of a trial."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from dem_warp import Case
@@ -11,7 +9,7 @@ from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
 from experiments.evidence.trials.generate_trials import PIXEL_SHARE, STUDY
-from experiments.evidence.trials.other_codes.code_effects import STRANGERS
+from experiments.evidence.trials.other_codes.code_effects import OUTSIDE
 from experiments.evidence.trials.other_codes.code_process import engine_for
 from experiments.evidence.trials.other_codes.setting import Setting
 from experiments.studyfile import Study, load_study
@@ -48,10 +46,10 @@ class OtherCodeSimulator(EngineSimulator):
 
     def case(self, point: Point) -> Case[Any]:
         """Build the case of a point, in the other workshop."""
-        known = tuple(size for size in point.sizes if size[0] not in STRANGERS)
+        known = tuple(size for size in point.sizes if size[0] not in OUTSIDE)
         ours = super().case(Point(point.theta, known, point.condition, point.seed))
         case: Case[Any] = self.setting.of(ours, self.code)
         for name, size in point.sizes:
-            if name in STRANGERS:
-                case = STRANGERS[name].change(case, size)
+            if name in OUTSIDE:
+                case = OUTSIDE[name].change(case, size)
         return case

@@ -1,7 +1,5 @@
 """Kinds of grains and walls of a case in another code: their materials, contacts and templates."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -113,7 +111,7 @@ class Bench:
 
     @property
     def smallest_radius(self) -> float:
-        """Of a sphere [m]."""
+        """Radius of a sphere [m]."""
         return min(float(template.radii.min()) for template in self.templates)
 
     @property

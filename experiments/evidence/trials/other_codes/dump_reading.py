@@ -5,8 +5,6 @@ look from the start of the lift to the rest; the balance is the mean force on th
 controller of the test looks at the frames as it looks at our own worlds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,7 +37,7 @@ class Frame:
     """Numbers of the grains in the code, rising, (n,)."""
     positions: np.ndarray
     velocities: np.ndarray
-    """Of the centres of mass [m], [m/s], (n, 3)."""
+    """Places and velocities of the centres of mass [m], [m/s], (n, 3)."""
     sizes: np.ndarray
     """Scales of the shape, (n,)."""
     spheres: np.ndarray

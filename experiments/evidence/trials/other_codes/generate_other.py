@@ -9,8 +9,6 @@ measured first, so that a record of some of them is balanced. After ``--seconds`
 command continues. The last unpacks the measured heaps of a record, whose labels are not there.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import secrets
@@ -29,7 +27,7 @@ from experiments.commands.console import clear_errors
 from experiments.discover.search import Search
 from experiments.evidence.trials.declaration import Declaration, read_declaration
 from experiments.evidence.trials.generate_trials import STUDY, bank_beside, seal_trials
-from experiments.evidence.trials.other_codes.code_effects import DECLARED, STRANGERS
+from experiments.evidence.trials.other_codes.code_effects import DECLARED, OUTSIDE
 from experiments.evidence.trials.other_codes.code_process import CODES, engine_for
 from experiments.evidence.trials.other_codes.code_simulator import OtherCodeSimulator, workshop_study
 from experiments.evidence.trials.other_codes.making import LAWS, MADE
@@ -53,7 +51,7 @@ from experiments.io.files import copy_file, write_text
 from experiments.io.toml_files import read_toml
 from experiments.studyfile import load_study
 
-PLAN = Plan(nulls=40, strong=8, weak=0, unresolved=8, withheld=0, strangers=4, pairs=12, replicates=8)
+PLAN = Plan(nulls=40, strong=8, weak=0, unresolved=8, withheld=0, outside=4, pairs=12, replicates=8)
 """Numbers of trials, where no other plan is given; mechanisms are those that the code can make."""
 
 SCALE = "bench"
@@ -74,14 +72,14 @@ def plan_for(code: str, plan: Plan) -> Plan:
 
 def write_reality(path: Path, code: str) -> None:
     """Write down which code makes the heaps, and how it makes each effect."""
-    told = {
+    reality = {
         "code": code,
         "name": CODES[code].name,
         "laws": LAWS[code],
         "library": dict(MADE[code]),
-        "strangers": {name: each.sentence for name, each in STRANGERS.items()},
+        "outside": {name: each.sentence for name, each in OUTSIDE.items()},
     }
-    write_text(path, json.dumps(told, indent=1) + "\n")
+    write_text(path, json.dumps(reality, indent=1) + "\n")
 
 
 def code_of(folder: Folder) -> str:
@@ -111,7 +109,7 @@ def measure_in_time(
 ) -> int:
     """Measure trials one after the other until a deadline of ``time.monotonic``; count what is left.
 
-    A trial of which too many heaps fail is told and left, to be tried again.
+    A trial of which too many heaps fail is reported and left, to be tried again.
     """
     code, study = code_of(folder), workshop_study(declaration.scale)
     conditions = [condition.name for condition in study.conditions]
@@ -130,11 +128,11 @@ def measure_in_time(
             outcomes = simulator(wave)
         failed = sum(bool(reason) and CLOGGED not in reason for reason in outcomes.reasons)
         if failed > MISSING * len(wave):
-            told = f"{failed} of {len(wave)} heaps failed: {max(outcomes.reasons)}"
-            print(f"{label.trial} not measured: {told}", flush=True)
+            problem = f"{failed} of {len(wave)} heaps failed: {max(outcomes.reasons)}"
+            print(f"{label.trial} not measured: {problem}", flush=True)
             refused += 1
             continue
-        # a stranger's clock and balance: the analysis allows for what is usual
+        # another laboratory's clock and balance: the analysis allows for what is usual
         write_heaps(
             folder.measured(label.trial), label, wave, outcomes, simulator.observables, calibrated=False
         )

@@ -1,7 +1,5 @@
 """The lifted cylinder of a trial as an input of LAMMPS, filmed and weighed while the tube rises."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import partial
@@ -112,7 +110,7 @@ class _Lot:
     is_odd: bool
     count: int
     steps: int
-    """From one grain to the next."""
+    """Distance from one grain to the next."""
 
 
 def _lots(bench: Bench) -> list[_Lot]:

@@ -1,7 +1,5 @@
 """The lifted cylinder of a trial as an input of LIGGGHTS, filmed and weighed while the tube rises."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -182,7 +180,7 @@ def _cohesion(bench: Bench) -> tuple[str, dict[str, str]]:
 def energy_density(work: float, radius: float, modulus: float) -> float:
     """Energy density k [J/m3] of ``sjkr`` with which two spheres are as hard to part as after JKR.
 
-    Its attraction is k 2 pi R* d, beside Hertz's 4/3 E* sqrt(R*) d^(3/2); their sum pulls by
+    Its attraction is k 2 pi R* d, against Hertz's 4/3 E* sqrt(R*) d^(3/2); their sum pulls by
     (2 pi R* k)^3 / (6.75 K^2) at the most, K = 4/3 E* sqrt(R*). JKR's contact holds 3/2 pi W R*.
 
     Parameters

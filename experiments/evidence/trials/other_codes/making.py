@@ -1,7 +1,5 @@
 """Ways in which the other codes make the effects of the library, and what differs from ours."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 _TILT = "gravity turned towards +x: the same"

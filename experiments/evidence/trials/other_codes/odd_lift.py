@@ -1,7 +1,5 @@
 """A lifted cylinder with more to it than any study can say: what only another code simulates."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, fields
 from typing import Annotated
@@ -37,12 +35,12 @@ class OddLift(LiftedCylinder):
 
     @property
     def lower_radius(self) -> float:
-        """Of the tube, on the plate [m]."""
+        """Radius of the tube on the plate [m]."""
         return self.diameter / 2 + self._widening
 
     @property
     def upper_radius(self) -> float:
-        """Of the tube, at its rim [m]."""
+        """Radius of the tube at its rim [m]."""
         return self.diameter / 2 - self._widening
 
     @property

@@ -24,7 +24,7 @@ LAWS: Mapping[str, ContactLaws] = {
     "lammps": replace(PRESETS["lammps"], restitution="closed_form", tangential_damping="tsuji"),
     "liggghts": PRESETS["liggghts"],
 }
-"""Laws of each code, but for rolling. LAMMPS is told the damping that the restitution means here: what it
+"""Laws of each code, but for rolling. LAMMPS gets the damping that the restitution means here: what it
 itself makes of the number is another grain, whose heap is flatter by a standard deviation."""
 
 ROLLING: Mapping[str, tuple[Rolling, ...]] = {

@@ -20,7 +20,7 @@ DIAMETER = 3e-3
 """Mean of the spheres [m]."""
 
 GLASS = Material(density=2500.0, shear_modulus=1e6, poisson_ratio=0.25)
-"""As heavy as glass, but so soft that a second takes 18,000 steps."""
+"""Spheres as heavy as glass, but so soft that a second takes 18,000 steps."""
 
 OUTLETS = (6, 7, 8, 9, 10)
 """Diameters of the outlet, in sphere diameters."""
@@ -30,7 +30,7 @@ FRICTIONS = {0.092: "spheres of glass", 0.25: "spheres of acetate", 0.5: "rough 
 
 ROLLING_FRICTION = 0.01
 WIDTH, DEPTH = 2.2, 3.0
-"""Of the bin and of its filling, in diameters of the outlet."""
+"""Sizes of the bin and of its filling, in diameters of the outlet."""
 
 RAIN_SPEED, RAIN_FRACTION = 0.5, 0.07
 """Speed of the rain [m/s], and the part of its volume that is spheres."""
@@ -55,7 +55,7 @@ first, whose density the spheres have; with more friction C falls."""
 
 
 def hopper_case(outlet: float, friction: float, seed: int) -> Case:
-    """Bin whose outlet is so many sphere diameters wide; all bins have the same proportions."""
+    """Bin with an outlet of some sphere diameters; all bins have the same proportions."""
     width = WIDTH * outlet * DIAMETER
     hopper = Hopper(
         diameter=width,

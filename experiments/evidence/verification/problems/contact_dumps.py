@@ -1,7 +1,5 @@
 """Running LIGGGHTS and LAMMPS on a path, and reading the states that they dump."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path
@@ -44,7 +42,7 @@ def run_path(program: str, package: str, text: str, folder: Path, count: int) ->
 
 
 def read_states(path: Path, count: int) -> Trajectory:
-    """Read the states of a dump of so many spheres."""
+    """Read the states of a dump of `count` spheres."""
     lines = path.read_text(encoding="utf-8").splitlines()
     starts = [i + 1 for i, line in enumerate(lines) if line.startswith("ITEM: ATOMS")]
     rows = [[line.split()[1:] for line in lines[start : start + count]] for start in starts]

@@ -19,13 +19,13 @@ class Touching:
     second: np.ndarray
     """Grains; a wall is the number after the last grain."""
     normal: np.ndarray
-    """From the second to the first, shape (n, 3)."""
+    """Unit vectors from the second to the first, shape (n, 3)."""
     overlap: np.ndarray
     radius: np.ndarray
     mass: np.ndarray
     """Overlap [m], effective radius [m] and effective mass [kg]."""
     levers: np.ndarray
-    """From both grains' centres to the contact [m], shape (2, n, 3)."""
+    """Arms from both grains' centres to the contact [m], shape (2, n, 3)."""
 
 
 class ContactFinder:

@@ -56,15 +56,15 @@ class _Contact:
         return normal, tangential, law.tangential_damping * law.damping * math.sqrt(tangential * mass)
 
     def levers(self, y: np.ndarray) -> np.ndarray:
-        """From the centres to the contact point, half the overlap inside [m]; none for a plane."""
+        """Arms from the centres to the contact point, half the overlap inside [m]; 0 for a plane."""
         return np.where(np.isfinite(self.radii), self.radii - 0.5 * y[0], 0.0)
 
     def tangential_velocities(self, y: np.ndarray) -> np.ndarray:
-        """Of the two centres [m/s]."""
+        """Velocities of the two centres [m/s]."""
         return np.array([self.impact.tangential_speed, 0.0]) + np.array([y[2], -y[2]]) / self.masses
 
     def spins_at(self, y: np.ndarray) -> np.ndarray:
-        """Of the two bodies [rad/s]."""
+        """Spins of the two bodies [rad/s]."""
         return self.spins - y[3:5] / self.inertias
 
     def slip(self, y: np.ndarray) -> float:

@@ -3,8 +3,6 @@
 Every path starts in mid-air or at rest on the plate, so that neither code knows of an earlier contact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,7 +39,7 @@ class ContactPath:
     spins: tuple[tuple[float, float, float], ...]
     """[rad/s]"""
     duration: float
-    """[s]"""
+    """Time step [s]."""
     rests: bool = False
     """Starts at rest on the plate under gravity, at the overlap that bears its weight."""
 
@@ -82,7 +80,7 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class PathSetup:
-    """A path under some laws, with all that another code must be told."""
+    """A path under some laws, with all that another code needs."""
 
     path: ContactPath
     laws: ContactLaws
@@ -94,7 +92,7 @@ class PathSetup:
 
     @property
     def time_step(self) -> float:
-        """[s]"""
+        """Time step [s]."""
         return FRACTION * rayleigh_time(min(self.pair), self.grain)
 
     @property
@@ -148,7 +146,7 @@ class PathSetup:
         steps = SAMPLES * self.stride
         motion = record([self._world()], steps + 1, device)
         velocities, spins = (
-            # they stand half a step before the places: the mean over two steps stands beside them
+            # they stand half a step before the places: the mean over two steps belongs to them
             np.concatenate([array[:1], 0.5 * (array[1:-1] + array[2:])])
             for array in (motion.velocities[: steps + 2], motion.spins[: steps + 2])
         )

@@ -1,7 +1,5 @@
 """Paths for codes that a program drives: what it reads, and the states that it leaves."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 from typing import Any
 
@@ -13,7 +11,7 @@ from experiments.export import Exporter, values
 
 
 def program_text(name: str) -> str:
-    """Text of a program beside this file."""
+    """Text of a program in this folder."""
     return (files("experiments.evidence.verification.problems") / name).read_text(encoding="utf-8")
 
 
@@ -42,10 +40,10 @@ def path_numbers(setup: PathSetup, exporter: Exporter) -> dict[str, Any]:
 def trajectory_of(states: ArrayLike) -> Trajectory:
     """Trajectory from the state at the start, then those at every stride and a step after.
 
-    Velocities stand half a step before the places: their mean over two steps stands beside them.
+    Velocities stand half a step before the places: their mean over two steps belongs to them.
     """
     every = np.asarray(states, dtype=float)
     at, after = every[1::2], every[2::2]
-    beside = np.concatenate([at[..., :3], 0.5 * (at[..., 3:] + after[..., 3:])], axis=-1)
-    found = np.concatenate([every[:1], beside])
+    centred = np.concatenate([at[..., :3], 0.5 * (at[..., 3:] + after[..., 3:])], axis=-1)
+    found = np.concatenate([every[:1], centred])
     return Trajectory(found[..., :3], found[..., 3:6], found[..., 6:9])

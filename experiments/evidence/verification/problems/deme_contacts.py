@@ -1,13 +1,11 @@
 """Contacts with the exported coefficients in DEM-Engine, against the same laws here.
 
-DEM-Engine needs a GPU, and its states are kept beside this file:
+DEM-Engine needs a GPU, and its states are kept in this folder:
 
     python -m experiments.evidence.verification.problems.deme_contacts write FOLDER
     (on a machine with a GPU, in FOLDER)  python3 paths.py
     python -m experiments.evidence.verification.problems.deme_contacts keep FOLDER
 """
-
-from __future__ import annotations
 
 import json
 import lzma
@@ -45,7 +43,7 @@ Two spheres, and a sphere on a plate, were followed in {version} on a GPU with t
 export` gives it, and here under the laws of the same name. An error is the largest difference of the two
 trajectories over their size. The two spheres are equal: DEM-Engine takes the circle of overlap from one of
 them, `deme::PI * (radA * overlapDepth - ...)` (`DEMCollisionKernels_SphSph.cuh`). Its velocities and forces
-are in float32, and so are the places at which it begins, 1.5 nm from those it is told: ours begin there too,
+are in float32, and so are the places at which it begins, 1.5 nm from those it is given: ours begin there too,
 as the overlap of the first touch decides how the tangential spring begins.
 
 Two things of its source make some paths differ by more than 1e-3. The circle has a term of the second order,
@@ -103,9 +101,9 @@ def _whole_circle(setup: PathSetup, theirs: Trajectory) -> Row:
             speed += force / mass * setup.time_step
         place += speed * setup.time_step
         speeds.append(speed)
-    # speeds stand half a step before the places, as everywhere: their mean over two steps stands beside them
-    beside = 0.5 * (np.array(speeds[:-1]) + np.array(speeds[1:]))[setup.stride - 1 :: setup.stride]
-    apart = np.abs(theirs.velocities[1:, 0, 2] - beside).max()
+    # speeds stand half a step before the places, as everywhere: their mean over two steps belongs to them
+    centred = 0.5 * (np.array(speeds[:-1]) + np.array(speeds[1:]))[setup.stride - 1 :: setup.stride]
+    apart = np.abs(theirs.velocities[1:, 0, 2] - centred).max()
     error = float(apart / abs(setup.path.speeds[0][2]))
     labels = (
         "deme",

@@ -39,7 +39,7 @@ SETTLING = 0.12
 
 CONSTANTS = ("modulus", "shear_modulus", "damping", "static_friction", "rolling_friction")
 
-TEXT = """Sixteen grains of nine spheres fall, turning, into a tube and settle. Beside the simulation, from
+TEXT = """Sixteen grains of nine spheres fall, turning, into a tube and settle. Next to the simulation, from
 its poses and velocities alone, an account in NumPy finds the contacts without neighbour lists, works out the
 documented law contact by contact, and books what every part of it did: stored in height, motion, normal and
 tangential springs; lost to normal and tangential damping, sliding and rolling friction; and what the

@@ -1,4 +1,4 @@
-"""A closed account of a world's energy, kept in float64 beside the simulation.
+"""A closed account of a world's energy, kept in float64 next to the simulation.
 
 From the poses and velocities of every step, and from nothing else of the simulator, the account finds the
 contacts, works out the documented law anew and books what each part of it does. The kinetic energy at a step
@@ -50,8 +50,8 @@ class Moment:
     forces: np.ndarray
     torques: np.ndarray
     rolling: np.ndarray
-    """Of all contacts on each grain [N], [N m], and the torque of its rolling resistance [N m], shape
-    (grains, 3)."""
+    """Forces and torques of all contacts on each grain [N], [N m], and the torque of its rolling resistance
+    [N m], shape (grains, 3)."""
 
 
 class EnergyAccount:
@@ -77,9 +77,7 @@ class EnergyAccount:
 
     @property
     def parts(self) -> np.ndarray:
-        """Energies of the `PARTS` after each step but the last: stored, and lost so far, (steps, parts)
-        [J].
-        """
+        """Energies of the `PARTS` after each step but the last, (steps, parts) [J]."""
         return np.array(self._rows)
 
     def see(self, state: Any) -> None:

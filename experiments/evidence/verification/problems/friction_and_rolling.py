@@ -49,7 +49,7 @@ def static_overlap(law: ContactCoefficients, slope: float = 0.0) -> float:
 
 
 def lever(law: ContactCoefficients) -> float:
-    """From the ball's centre to its contact, half the overlap above the plane [m]."""
+    """Distance from the ball's centre to its contact, half the overlap above the plane [m]."""
     return RADIUS - 0.5 * static_overlap(law)
 
 

@@ -28,7 +28,7 @@ them, with half the time step, with forces in float64, and out of a tube of {SEG
 triangles each, whose cross-section has the area of the round one's. A replicate is another seed; kinds are
 compared unpaired. A kind passes when the 95 % interval of the shift of its mean angle (Welch) lies within
 {MARGIN:g} degree. That is stricter than two one-sided tests at 5 % (D. J. Schuirmann, Journal of
-Pharmacokinetics and Biopharmaceutics 15 (1987) 657-680), whose p is beside.
+Pharmacokinetics and Biopharmaceutics 15 (1987) 657-680), whose p is given, too.
 
 Half the skin of the neighbour lists needs no statistics: it gives the same bits, so that its shift is zero.
 
@@ -72,7 +72,7 @@ BASE = "production"
 
 
 def heaps(study: Study, replicates: int, device: str) -> dict[str, list[CaseResult]]:
-    """Results of every kind of heap, so many of each."""
+    """Results of every kind of heap."""
     base = [study.case({}, FIRST_SEED + number) for number in range(replicates)]
     cases = {BASE: base} | {name: [change(case) for case in base] for name, change in KINDS.items()}
     return {name: finished_cases(kind, device) for name, kind in cases.items()}

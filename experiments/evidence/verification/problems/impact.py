@@ -1,6 +1,4 @@
-"""One impact of a sphere on a plane or on another sphere: its settings, its Hertz solution, its
-simulation.
-"""
+"""One impact of a sphere on a plane or another sphere: settings, Hertz solution, simulation."""
 
 import math
 from collections.abc import Sequence
@@ -55,12 +53,12 @@ class Impact:
 
     @property
     def mass(self) -> float:
-        """Of the falling sphere [kg]."""
+        """Mass of the falling sphere [kg]."""
         return _mass(self.material, self.radius)
 
     @property
     def partner_mass(self) -> float:
-        """Of what is hit [kg]; a plane's is infinite."""
+        """Mass of what is hit [kg]; a plane's is infinite."""
         return _mass(self.partner.material, self.partner.radius) if self.partner else math.inf
 
     @property
@@ -132,7 +130,7 @@ class Course:
 
     @property
     def duration(self) -> float:
-        """From first to last touch [s], the overlap being interpolated to zero."""
+        """Time from first to last touch [s], the overlap being interpolated to zero."""
         d = self.overlap
         first, last = np.flatnonzero(d > 0.0)[[0, -1]]
         before = d[first] / (d[first] - d[first - 1])

@@ -22,7 +22,7 @@ from experiments.evidence.verification.check import (
 from experiments.evidence.verification.problems.setups import GRAVITY, STEEL, bodies, contact
 
 GLASS = Material(density=2500.0, shear_modulus=1e6, poisson_ratio=0.25)
-"""As heavy as glass, but so soft that a second takes 17,000 steps; overlaps stay below a hundredth."""
+"""Material as heavy as glass, so soft that a second takes 17,000 steps; overlaps stay below a hundredth."""
 
 SPHERE = ClumpShape.sphere(1.5e-3)
 FRICTION, WALL_FRICTION = 0.5, 0.2
@@ -37,7 +37,7 @@ SETTLING = 0.35
 """Time in which the spheres fall and come to rest [s]."""
 
 SPEED = 10e-3
-"""Of the tube [m/s]."""
+"""Speed of the tube [m/s]."""
 
 PULL = 0.6
 """Time for which it is drawn [s]; loads are means over the second half of it."""
@@ -71,9 +71,9 @@ class Loads:
     diameter: float
     height: float
     weight: float
-    """Of the column [m], [N]; the height is twice that of its centre of mass."""
+    """Height and weight of the column [m], [N]; the height is twice that of its centre of mass."""
     path: np.ndarray
-    """That the tube has come [m], shape (samples,)."""
+    """Path of the tube so far [m], shape (samples,)."""
     floor: np.ndarray
     wall: np.ndarray
     """Vertical load on the floor and horizontal load on the wall [N], shape (samples,)."""

@@ -29,7 +29,7 @@ def friction_speed(impact: Impact) -> float:
 def simulated_courses(
     impacts: Sequence[Impact], steps: float | None, device: str, precision: str = "double"
 ) -> list[Course]:
-    """Courses of impacts of so many steps each, None for those of its production step."""
+    """Courses of impacts by their numbers of steps, None for those of its production step."""
     return [phases[0] for phases in simulate_impacts(impacts, steps, device, precision=precision, length=2.0)]
 
 

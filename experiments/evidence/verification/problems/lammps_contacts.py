@@ -1,7 +1,5 @@
 """Contacts with the exported coefficients in LAMMPS, against the same laws here."""
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -43,7 +41,7 @@ SHALLOWER = STIFFER**-0.4
 """Factors on the modulus and, by Hertz, on the overlap of an impact."""
 
 SHARE_TOLERANCE = 0.15
-"""Of the ratio of two differences, beside the squares of the overlap, 2 % of a radius at the most."""
+"""Error of the ratio of two differences, besides the squares of the overlap, 2 % of a radius at the most."""
 
 
 def lammps_contacts(device: str) -> Result:

@@ -27,7 +27,7 @@ Debian) with the template and the coefficients that `dem-warp export` gives it, 
 same name. An error is the largest difference of the velocities, or spins, after 30 ms, over the largest
 change of one. LIGGGHTS puts them in at random within 10 nm. Under EDEM's laws the difference is seen."""
 
-CLUMP = Path(__file__).parents[2] / "studies" / "trial" / "clump.txt"
+CLUMP = Path(__file__).parents[3] / "studies" / "trial" / "clump.txt"
 GRAIN = Material(density=1300.0, shear_modulus=2.0e6, poisson_ratio=0.3)
 LAWS = PRESETS["liggghts"]
 FRICTIONS = (0.0, 0.3, 1.0)
@@ -110,13 +110,13 @@ def liggghts_clumps(device: str) -> Result:
 
 def _differences(meeting: Meeting, ours: Motion, theirs: Motion) -> dict[str, float]:
     """Largest differences of velocities and of spins over their largest changes."""
-    told = {}
+    changes = {}
     for what, own, other, start in zip(
         ("velocity", "spin"), ours, theirs, (meeting.velocities, meeting.spins), strict=True
     ):
         change = np.linalg.norm(own - start, axis=1).max()
-        told[f"{what}, difference over change"] = float(np.linalg.norm(own - other, axis=1).max() / change)
-    return told
+        changes[f"{what}, difference over change"] = float(np.linalg.norm(own - other, axis=1).max() / change)
+    return changes
 
 
 def _contact(friction: float, shape: ClumpShape, laws: ContactLaws) -> Contact:

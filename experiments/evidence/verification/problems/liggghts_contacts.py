@@ -1,7 +1,5 @@
 """Contacts with the exported coefficients in LIGGGHTS, against the same laws here."""
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import replace
 from pathlib import Path

@@ -39,7 +39,7 @@ RANGES = {
     "slip before above 3 mu v": SLIPS > 3.0,
 }
 PHASES = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Of the step at which the sphere meets the plane: the row of springs begins as wide as the first contact."""
+"""Length of the step in which the sphere meets the plane: the springs begin as wide as the first contact."""
 
 ORDERS = (100, 200, 400, 800)
 IMPULSE = "tangential impulse / (2 mu m v)"

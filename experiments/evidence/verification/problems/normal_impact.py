@@ -70,7 +70,7 @@ about 1,000 steps an impact for half a percent. At the step of production, a buc
 steps an impact, are further off."""
 
 TIP_SPEED = 1.5
-"""Of a grain that falls through the whole tube of the study [m/s]."""
+"""Speed of a grain that falls through the whole tube of the study [m/s]."""
 
 UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0)
 
@@ -98,9 +98,7 @@ def _hertz(impact: Impact) -> tuple[float, float, float, float]:
 
 
 def hertz_rows(problem: str, case: str, courses: list[Course], tolerance: float) -> list[Row]:
-    """Overlap, force, duration, speed after, and the whole force curve against Hertz, the worst course
-    each.
-    """
+    """Overlap, force, duration, speed after, and force curve against Hertz; the worst course of each."""
     want = np.array([_hertz(c.impact) for c in courses])
     seen = np.array([_seen(c) for c in courses])
     rows = [

@@ -1,6 +1,4 @@
-"""Motion of a free rigid grain: Poinsot's invariants and Euler's equations; momentum of clumps that
-collide.
-"""
+"""Free rigid grains: Poinsot's invariants and Euler's equations; momentum of clumps that collide."""
 
 import numpy as np
 from scipy.integrate import solve_ivp

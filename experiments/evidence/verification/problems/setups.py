@@ -29,7 +29,7 @@ RIGID = material(1e30, 0.3, 1.0)
 """A partner so stiff that the effective moduli are those of the other body."""
 
 
-CLUMP = Path(__file__).parents[2] / "studies" / "buckwheat" / "clump.txt"
+CLUMP = Path(__file__).parents[3] / "studies" / "buckwheat" / "clump.txt"
 """The reference grain of the buckwheat study, nine spheres; it stands on three of them."""
 
 BUCKWHEAT = Material(density=698.0, shear_modulus=34.325e6, poisson_ratio=0.29)
@@ -125,7 +125,7 @@ class Motion:
 
     @classmethod
     def of(cls, state: Any, *count: int) -> "Motion":
-        """Copy of a solver's state of so many worlds and grains, or of so many grains."""
+        """Copy of a solver's state of worlds and grains, or of grains."""
         return cls(
             state.position.numpy().reshape(*count, 3).copy(),
             state.orientation.numpy().reshape(*count, 4).copy(),

@@ -13,7 +13,7 @@ from experiments.studyfile import Study
 from imaging import PictureError
 
 CASES = Path("out") / "verification" / "cases"
-"""Folder of the cases, beside the pages of problems that were run by name."""
+"""Folder of the cases, next to the pages of problems that were run by name."""
 
 
 def finished_cases(cases: Sequence[Case], device: str, store: Store | None = None) -> list[CaseResult]:

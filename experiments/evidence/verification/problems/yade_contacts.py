@@ -1,7 +1,5 @@
 """Contacts with the exported coefficients in Yade, against the same laws here."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

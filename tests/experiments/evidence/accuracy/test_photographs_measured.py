@@ -42,8 +42,8 @@ def test_a_drawn_shadow_is_as_large_as_the_lamp_throws_it() -> None:
     hidden = sharp_shadow(wall, (0.0, -4.0, 0.0), 0.0, ball, camera)
     # A pixel of the lamp's view is a hundredth of the radius.
     assert np.sqrt(hidden.sum() * 0.005**2 / np.pi) == pytest.approx(0.3, rel=0.02)
-    beside = sharp_shadow(wall, (-4.0, -4.0, 0.0), 0.0, ball, camera)
-    assert beside.sum() == 0.0
+    level = sharp_shadow(wall, (-4.0, -4.0, 0.0), 0.0, ball, camera)
+    assert level.sum() == 0.0
 
 
 def test_a_sharp_shadow_on_the_wall_is_taken_off() -> None:
@@ -72,7 +72,7 @@ def test_a_few_even_windows_between_grains_are_no_shadow(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [940291, 940315])
 def test_a_shadow_that_fades_away_from_the_foot_is_no_dish(seed: int) -> None:
-    """From above the foot's shadow is seen on the plate: a tenth of the width below it half of it is left."""
+    """Seen from above, the foot's shadow is on the plate: half of it is left a tenth of the width below."""
     shot = photograph(seed)
     angle = measure(shot.picture)
     assert angle.doubts == ()

@@ -1,7 +1,5 @@
 """The proof that a card travels: its cards, its comparison on drawn truth, and that it goes on."""
 
-from __future__ import annotations
-
 import shutil
 import stat
 import sys
@@ -133,14 +131,14 @@ def test_an_input_is_the_same_whatever_the_processor_rounds() -> None:
     def key(text: str) -> str:
         return travel._input_key(Translation({"lift.in": text}, "lift.in", ("lmp",), "heap.dump", ()))
 
-    told = key("pour 2000 5255741 0.233711711664793 -2.53984396e-20 1.5e6")
-    assert key("# a word\npour 2000 5255741 0.233711711664794 3e-21 1500000.0000000001") == told
+    expected = key("pour 2000 5255741 0.233711711664793 -2.53984396e-20 1.5e6")
+    assert key("# a word\npour 2000 5255741 0.233711711664794 3e-21 1500000.0000000001") == expected
     for other in (
         "2000 5255742 0.233711711664793",
         "2000 5255741 0.2337118",
         "2001 5255741 0.233711711664793",
     ):
-        assert key(f"pour {other} -2.53984396e-20 1.5e6") != told
+        assert key(f"pour {other} -2.53984396e-20 1.5e6") != expected
 
 
 def test_a_run_is_measured_stored_and_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

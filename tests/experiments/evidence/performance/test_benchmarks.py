@@ -1,7 +1,5 @@
 """The benchmarks' instruments: scene, counts, record. Speeds are not tested."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path

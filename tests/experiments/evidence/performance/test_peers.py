@@ -1,6 +1,4 @@
-"""Comparisons with other codes: what each is told of a column, and that its answer is read. None is run."""
-
-from __future__ import annotations
+"""Comparisons with other codes: their input for a column, and the reading of their answers. None is run."""
 
 import json
 import stat
@@ -151,7 +149,7 @@ def test_a_peer_gets_the_column_and_its_answer_is_read(
         assert done.timings[skin].free_spheres == 9 * column.setup.grains.count
 
 
-# ---- what each is told -------------------------------------------------------------------------------------
+# ---- input of each code ------------------------------------------------------------------------------------
 
 
 def rebound(damping: Callable[[float], float]) -> float:

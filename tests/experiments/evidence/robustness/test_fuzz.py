@@ -1,7 +1,5 @@
 """Mutated files through every reader; ``FUZZ_INPUTS=100000 pytest THIS_FILE`` is a long run."""
 
-from __future__ import annotations
-
 import os
 import resource
 import time

@@ -1,7 +1,5 @@
 """A command that is killed and resumed, and the rules that its folder is held to."""
 
-from __future__ import annotations
-
 import os
 import random
 from pathlib import Path

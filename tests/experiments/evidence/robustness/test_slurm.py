@@ -1,7 +1,5 @@
 """Workers as jobs of a real SLURM, of one node on this machine."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -37,12 +35,12 @@ def test_jobs_are_workers_and_one_that_is_requeued_loses_nothing(
     study = load_study(write_study(("grain_count = 30", "grain_count = 120")))
     cases = [study.case({"E": 0.2 + 0.05 * number}, number) for number in range(6)]
     section = read_profile(PROFILE).model_copy(update={"shared": str(tmp_path / "shared")})
-    told: Counter[int] = Counter()
+    counted: Counter[int] = Counter()
     requeued: list[str] = []
 
     def note(index: int, result: CaseResult) -> None:
         """Count, and requeue a job once the first case has ended: another one runs there."""
-        told[index] += 1
+        counted[index] += 1
         if not requeued:
             jobs = slurm.command(node, "squeue", "--noheader", "--states=R", "--format=%i").split()
             requeued.append(jobs[0])
@@ -52,7 +50,7 @@ def test_jobs_are_workers_and_one_that_is_requeued_loses_nothing(
         results = workers.simulate(cases, None, note, None, tmp_path / "unfinished")
         assert workers.described == {"device": "2 workers of slurm", "workers": 2}
     assert requeued
-    assert told == Counter(range(6))
+    assert counted == Counter(range(6))
     for one, other in zip(results, OwnWorkers("cpu", 2).simulate(cases), strict=True):
         assert one.status == other.status == "finished"
         np.testing.assert_array_equal(one.positions, other.positions)

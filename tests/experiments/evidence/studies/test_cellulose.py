@@ -68,15 +68,18 @@ def test_second_points_are_about_what_is_compatible(study):
     assert (points.std(axis=0) > compatible.std(axis=0)).all()
 
 
-def made_up(study: Study, row: pd.Series) -> np.ndarray:
+def measured_at_places() -> list[np.ndarray]:
+    """Heights of the measured edges at all places."""
+    x = 1e3 * cellulose_plan.places()
+    edges = map(measured_edge, cellulose_plan.MEASURED)
+    return [np.interp(x, edge["x_mm"], edge["z50_mm"]) for edge in edges]
+
+
+def made_up(study: Study, row: pd.Series, edges: list[np.ndarray], x: np.ndarray) -> np.ndarray:
     """Edge of a model that is made up: the mean of the measured ones, turned and lifted by the settings."""
     mu, mu_r, wall, fill = cellulose_plan.coded(study, row.to_frame().T.astype({"mu": float}))[0].astype(
         float
     )
-    x = 1e3 * cellulose_plan.places()
-    edges = [
-        np.interp(x, edge["x_mm"], edge["z50_mm"]) for edge in map(measured_edge, cellulose_plan.MEASURED)
-    ]
     share = (np.log(row["rpm"]) - np.log(15)) / np.log(3)
     return (
         (1 - share) * edges[0]
@@ -87,16 +90,18 @@ def made_up(study: Study, row: pd.Series) -> np.ndarray:
     )
 
 
+@pytest.mark.usefixtures("few_moves")
 def test_the_whole_study_on_made_up_edges(tmp_path, monkeypatch):
+    study, edges, x = cellulose_plan.study_at("bench"), measured_at_places(), 1e3 * cellulose_plan.places()
+
     def pretend(study, table, folder, device=None, workers=None):
         cellulose_heaps._note_time(folder, table["stage"].iloc[0], len(table), 1.0)
-        told = {"status": "finished", "reason": "", "grain_count": 1.0, "dynamic_angle": 1.0}
-        return table.assign(**told, case=[str(seed) for seed in table["seed"]])
+        values = {"status": "finished", "reason": "", "grain_count": 1.0, "dynamic_angle": 1.0}
+        return table.assign(**values, case=[str(seed) for seed in table["seed"]])
 
     def curves_of(table, folder):
-        study = cellulose_plan.study_at("bench")
         rng = np.random.default_rng(len(table))
-        rows = np.array([made_up(study, row) for _, row in table.iterrows()])
+        rows = np.array([made_up(study, row, edges, x) for _, row in table.iterrows()])
         rows += rng.normal(0.0, 0.1, (len(rows), 1))
         return table.reset_index(drop=True), {0.2: rows + 0.6, 0.5: rows, 0.8: rows - 1.0}
 
@@ -135,9 +140,9 @@ def test_a_measured_edge_has_no_residual():
     assert np.abs(residuals(15, curve)).max() < 1e-9
     table = pd.DataFrame({"stage": ["check"], "point": [0], "rpm": [15]})
     # a millimetre too high, over the width of the counted disc
-    told = residual_table(table, curve[None] + 1.0, 1e-3 * RADIUS_MM).iloc[0]
-    assert told["rms_mm"] == pytest.approx(1.0)
-    assert 40.0 < told["area_mm2"] < 2.0 * np.sqrt(0.6) * RADIUS_MM
+    row = residual_table(table, curve[None] + 1.0, 1e-3 * RADIUS_MM).iloc[0]
+    assert row["rms_mm"] == pytest.approx(1.0)
+    assert 40.0 < row["area_mm2"] < 2.0 * np.sqrt(0.6) * RADIUS_MM
 
 
 def test_an_unknown_scale_is_refused(tmp_path):

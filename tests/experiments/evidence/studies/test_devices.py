@@ -1,7 +1,5 @@
 """Scripts that are given a device which is not there, or a file for a folder: an answer, nothing written."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 
@@ -55,5 +53,5 @@ def test_a_device_that_is_not_there_is_answered_before_anything_is_written(
     assert code == 2
     said = " ".join(err.replace("│", " ").split())
     assert "--device" in said
-    assert f"not {ABSENT}" in said
+    assert f"got '{ABSENT}'" in said
     assert list(tmp_path.iterdir()) == []

@@ -1,7 +1,5 @@
 """The command that simulates the paper's runs again."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pandas as pd

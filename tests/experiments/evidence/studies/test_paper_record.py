@@ -1,6 +1,4 @@
-"""The record of the paper's runs: its page follows from the tables beside it."""
-
-from __future__ import annotations
+"""The record of the paper's runs: its page follows from its tables."""
 
 import tomllib
 from pathlib import Path
@@ -90,7 +88,7 @@ def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaig
     assert shown[-1][5] == f"{expected.value:.2f} [{expected.low:.2f},\u00a0{expected.high:.2f}]"
     assert [row[0] for row in numbers_of(page, "Every run")].count("Table 6") == 13
     assert "In all 6 heaps in 45 s." in page
-    # The campaign's own screening stands beside.
+    # The campaign's own screening is compared.
     effect = campaign.screening.leading.screen.table["effect"]["F"]
     assert f"{effect:.2f}" in next(row for row in numbers_of(page, "Screening") if "F" in row[0])
     assert f"Outcome: {campaign.outcome.value}. {campaign.reason}" in page

@@ -1,7 +1,5 @@
 """The paper's runs: laid out as printed, and analysed as the paper analyses its own."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

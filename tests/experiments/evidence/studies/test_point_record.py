@@ -1,7 +1,5 @@
 """The record of what further responses buy: gathered, and its page written anew from the cases."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +9,7 @@ import pandas as pd
 import pytest
 
 from experiments.calibrate import Campaign, calibrate
+from experiments.evidence.studies.buckwheat.records import point_record
 from experiments.evidence.studies.buckwheat.records.point_record import (
     CASES,
     STUDY,
@@ -70,8 +69,11 @@ def test_kept_cases_repeat_the_campaigns_findings_to_the_bit(
     assert again.reason == campaign.reason
 
 
-def test_the_page_is_the_same_whenever_it_is_written(folder: Path, tmp_path: Path) -> None:
+def test_the_page_is_the_same_whenever_it_is_written(
+    campaign: Campaign, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     record = tmp_path / "record"
+    monkeypatch.setattr(point_record, "kept_campaign", lambda study, folder: campaign)
     gather("bench", folder, record)
     first = write_record_page(record).read_text(encoding="utf-8")
     assert write_record_page(record).read_text(encoding="utf-8") == first

@@ -79,6 +79,7 @@ def test_drums_differ_by_their_axis_and_their_cover(study):
     assert cover == {"front": pytest.approx(row["mu_cover"])}
 
 
+@pytest.mark.usefixtures("few_moves")
 def test_the_fit_finds_what_was_made_up(study):
     slopes, data = Slopes.of(study, drums_of(study)), measured_of(TRUTH)
     found = fit_slopes(slopes, data)
@@ -86,11 +87,12 @@ def test_the_fit_finds_what_was_made_up(study):
     low, high = np.quantile(found.settings, [0.005, 0.995], axis=0)
     assert ((low <= TRUTH) & (high >= TRUTH)).all()
     # one slope cannot tell sliding from rolling, and each inclined one has a wall of its own
-    told = found.ranges(study).set_index("setting")
-    assert list(told.index) == list(SETTINGS)
-    assert told.loc["mu", "part of the design"] > told.loc["mu_steel", "part of the design"]
+    ranges = found.ranges(study).set_index("setting")
+    assert list(ranges.index) == list(SETTINGS)
+    assert ranges.loc["mu", "part of the design"] > ranges.loc["mu_steel", "part of the design"]
 
 
+@pytest.mark.usefixtures("few_moves")
 def test_a_datum_that_contradicts_the_others_is_seen(study):
     slopes, data = Slopes.of(study, drums_of(study)), measured_of(TRUTH)
     wrong = data | {drum_plan.UPRIGHT: type(data["steel"])(60.0, 3.12, 20)}
@@ -99,16 +101,17 @@ def test_a_datum_that_contradicts_the_others_is_seen(study):
     assert without.loc[drum_plan.UPRIGHT, "high"] < 60.0
 
 
+@pytest.mark.usefixtures("few_moves")
 def test_a_run_has_its_tables_its_page_and_its_search(study, tmp_path, monkeypatch):
     def pretend(study, table, store, workers):
         if "scene" in table:
-            told = {
+            values = {
                 "dynamic_angle": drums_of(study, len(table) // 2)["dynamic_angle"],
                 "dynamic_angle_se": 0.3,
             }
         else:
-            told = {"angle": 30.0 + np.arange(len(table)), "angle_se": 0.4}
-        return table.assign(status="finished", reason="", grain_count=150.0, **told)
+            values = {"angle": 30.0 + np.arange(len(table)), "angle_se": 0.4}
+        return table.assign(status="finished", reason="", grain_count=150.0, **values)
 
     monkeypatch.setattr(drum_campaign, "run_cases", pretend)
     drum_campaign.run_study("bench", tmp_path, "cpu")

@@ -1,7 +1,5 @@
 """A bank that is looked at again: its points are known, and a value that differs is seen."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -28,6 +26,11 @@ def bank(search: Search) -> Bank:
     return search.read_bank(bank_beside(BENCH))
 
 
+@pytest.fixture(scope="module")
+def points(bank: Bank, search: Search) -> list[Point]:
+    return points_of(bank, search)
+
+
 class _Kept:
     """The bank's own values, one of them changed, as if an engine gave them."""
 
@@ -42,8 +45,7 @@ class _Kept:
         return Outcomes(self._values[rows][:, ::-1], tuple(str(self._reasons[row]) for row in rows))
 
 
-def test_points_are_those_that_the_bank_was_made_of(bank: Bank, search: Search) -> None:
-    points = points_of(bank, search)
+def test_points_are_those_that_the_bank_was_made_of(bank: Bank, search: Search, points: list[Point]) -> None:
     assert len(points) == len(bank.reasons)
     numbers = [search.space.conditions.index(point.condition) for point in points]
     assert np.array_equal(numbers, bank.condition)
@@ -56,8 +58,7 @@ def test_points_of_another_bank_are_refused(bank: Bank, search: Search) -> None:
         points_of(replace(bank, theta=0.9 * bank.theta), search)
 
 
-def test_a_run_that_differs_in_one_observable_is_named(bank: Bank, search: Search) -> None:
-    points = points_of(bank, search)
+def test_a_run_that_differs_in_one_observable_is_named(bank: Bank, points: list[Point]) -> None:
     rows = np.arange(0, len(points), 7)
     simulator = _Kept(bank, points, changed=int(rows[5]))
     assert differing(bank, points, rows, simulator).tolist() == [rows[5]]

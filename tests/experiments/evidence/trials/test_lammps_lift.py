@@ -1,7 +1,5 @@
 """A second reality in LAMMPS: its input says what was hidden, and refuses what it cannot make."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace
@@ -13,7 +11,7 @@ from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.jkr import JKR
 from dem_warp.materials import tsuji_damping
 from experiments.evidence.trials.generate_trials import STUDY
-from experiments.evidence.trials.other_codes.code_effects import SLIPPERY, STRANGERS
+from experiments.evidence.trials.other_codes.code_effects import OUTSIDE, SLIPPERY
 from experiments.evidence.trials.other_codes.code_surfaces import Bench
 from experiments.evidence.trials.other_codes.generate_other import plan_for
 from experiments.evidence.trials.other_codes.lammps_trials import lammps_files, surface_energy
@@ -45,7 +43,7 @@ def test_lammps_is_told_what_is_hidden() -> None:
     assert [line.split()[3] for line in adhesive.splitlines() if line.startswith("pair_coeff")] == ["dmt"]
     assert adhesive.count("dmt") == 1
     assert "rotate v_turn" in text
-    turning = lammps_text(STRANGERS["turning_tube"].change(case, 5.0))
+    turning = lammps_text(OUTSIDE["turning_tube"].change(case, 5.0))
     [rate] = re.findall(r"variable turn equal \"\(step - v_begin\) \* (\S+)\"", turning)
     assert float(rate) == pytest.approx(5.0 * case.time_step)
     tilt = math.radians(5.0)
@@ -56,7 +54,7 @@ def test_lammps_is_told_what_is_hidden() -> None:
     )
     scene = replace(case.scene, vibration_amplitude=1e-4)
     assert 'variable shake equal "v_shakes * 0.0001 * sin(' in lammps_text(replace(case, scene=scene))
-    cone = STRANGERS["conical_tube"].change(case, 3.0)
+    cone = OUTSIDE["conical_tube"].change(case, 3.0)
     [ends] = re.findall(r"region tube cone z 0 0 (\S+) (\S+) 0 (\S+) ", lammps_text(cone))
     low, high, height = (float(number) for number in ends)
     assert low + high == pytest.approx(case.scene.diameter, rel=1e-8)
@@ -67,7 +65,7 @@ def test_lammps_has_a_contact_for_each_kind_of_grain() -> None:
     case = case_of()
 
     def contacts(effect: str, size: float) -> dict[str, list[float]]:
-        text = lammps_text(STRANGERS[effect].change(case, size))
+        text = lammps_text(OUTSIDE[effect].change(case, size))
         place = r"(?:pair_coeff|fix) (\S+ \S+) (?:wall/gran/region granular )?"
         found = re.findall(place + r"hertz/material (\S+) .* mindlin \S+ \S+ (\S+)", text)
         return {name: [float(modulus), float(friction)] for name, modulus, friction in found}
@@ -107,7 +105,7 @@ def test_the_damping_is_ours_and_the_sums_of_rains_are_the_grains() -> None:
     among = ours.contacts(ours.scene.wall_material)[0]
     # the number that LAMMPS's polynomial makes our damping of, to the root's own tolerance
     assert tsuji_damping(float(restitution)) == pytest.approx(among.damping, rel=1e-9)
-    mixed = lammps_text(STRANGERS["slippery_class"].change(case_of(), 0.3))
+    mixed = lammps_text(OUTSIDE["slippery_class"].change(case_of(), 0.3))
     for one, counts in ((text, [100]), (mixed, [70, 30])):
         assert [int(count) for count in re.findall(r"deposit (\d+) ", one)] == counts
         for shares in re.findall(r"molfrac ([\d. e+-]+) rigid", one):

@@ -1,7 +1,5 @@
 """A second reality: inputs say what was hidden, films are read as they were drawn, codes run them."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator
@@ -21,7 +19,7 @@ from experiments.cases import OwnWorkers
 from experiments.cases.engines.program import AnswerError
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.evidence.trials.generate_trials import STUDY
-from experiments.evidence.trials.other_codes.code_effects import DECLARED, STRANGERS
+from experiments.evidence.trials.other_codes.code_effects import DECLARED, OUTSIDE
 from experiments.evidence.trials.other_codes.code_process import engine_for
 from experiments.evidence.trials.other_codes.code_simulator import OtherCodeSimulator
 from experiments.evidence.trials.other_codes.code_surfaces import Bench
@@ -64,18 +62,18 @@ def case_of(code: str = "liggghts") -> Case:
 SHAPE = case_of().grains.mixture.shapes[0]
 
 
-def test_rolling_friction_is_told_to_other_codes_with_the_lever_that_the_study_has() -> None:
+def test_rolling_friction_is_friction_to_other_codes_with_the_lever_that_the_study_has() -> None:
     # the lever is R* there: half a sphere's radius among spheres, all of it on a wall
     sphere = ClumpShape.sphere(1e-3)
     study = {"contact": {kind: {"rolling_friction": 0.1} for kind in ("grain-grain", "grain-wall")}}
-    told = {}
+    friction = {}
     for laws in ("edem", "relative"):
         case = load_study(STUDY, "bench", study | {"solver": {"laws": laws}}).case(THETA, seed=3)
         case = replace(case, grains=GrainPopulation(sphere, case.grain_material))
         theirs = SETTING.of(case, "liggghts")
-        told[laws] = [theirs.grain_grain.rolling_friction, theirs.grain_wall.rolling_friction]
-    assert told["edem"] == pytest.approx([0.2, 0.1], rel=1e-12)
-    assert told["relative"] == [0.1, 0.1]
+        friction[laws] = [theirs.grain_grain.rolling_friction, theirs.grain_wall.rolling_friction]
+    assert friction["edem"] == pytest.approx([0.2, 0.1], rel=1e-12)
+    assert friction["relative"] == [0.1, 0.1]
 
 
 # ---- the film ----------------------------------------------------------------------------------------------
@@ -199,21 +197,21 @@ def test_bridges_pull_alike_where_spheres_touch_and_break_alike() -> None:
 def test_each_stranger_changes_the_case_and_keeps_the_mean_mass() -> None:
     case = case_of()
     whole = Bench(case).templates
-    for effect in STRANGERS.values():
+    for effect in OUTSIDE.values():
         changed = effect.change(case, effect.maximum)
         assert changed != case
         templates = Bench(changed).templates
         assert sum(t.fraction * t.mass for t in templates) == pytest.approx(
             sum(t.fraction * t.mass for t in whole), rel=1e-6
         )
-    assert [each.name for each in DECLARED] == list(STRANGERS)
+    assert [each.name for each in DECLARED] == list(OUTSIDE)
 
 
 def liggghts_text(case: Case) -> str:
     return liggghts_files(Bench(case))["lift.in"]
 
 
-def test_liggghts_is_told_what_is_hidden() -> None:
+def test_liggghts_is_friction_what_is_hidden() -> None:
     case = case_of()
     assert "cohesion" not in liggghts_text(case)
     adhesive = replace(case, mechanisms=(JKR(between="grains", work_of_adhesion=0.02),))
@@ -221,10 +219,10 @@ def test_liggghts_is_told_what_is_hidden() -> None:
     # among grains alone: the walls' laws have no adhesion
     assert "pair_style gran model hertz tangential history cohesion sjkr" in text
     assert "wall/gran model hertz tangential history rolling_friction" in text
-    turning = STRANGERS["turning_tube"].change(case, 5.0)
+    turning = OUTSIDE["turning_tube"].change(case, 5.0)
     unfixed = re.findall(r"unfix (turn|lift)", liggghts_text(turning))
     assert unfixed == ["turn", "lift"]  # motions that are superposed are taken off in reverse order
-    slippery = liggghts_text(STRANGERS["slippery_class"].change(case, 0.5))
+    slippery = liggghts_text(OUTSIDE["slippery_class"].change(case, 0.5))
     friction = np.array(
         slippery.split("coefficientFriction peratomtypepair 4 ")[1].split("\n")[0].split(), float
     ).reshape(4, 4)
@@ -236,7 +234,7 @@ def test_liggghts_is_told_what_is_hidden() -> None:
 
 
 def test_a_conical_tube_is_right_at_half_its_height() -> None:
-    case = STRANGERS["conical_tube"].change(case_of(), 3.0)
+    case = OUTSIDE["conical_tube"].change(case_of(), 3.0)
     numbers = re.findall(r"vertex (\S+) (\S+) (\S+)", liggghts_files(Bench(case))["tube.stl"])
     corners = np.array(numbers, dtype=float)
     inner = np.hypot(corners[:, 0], corners[:, 1]) * math.cos(math.pi / SETTING.tube_sides)
@@ -265,7 +263,7 @@ def test_the_plan_holds_at_least_120_trials_of_what_the_code_can_make() -> None:
     assert plan.mechanisms == tuple(MADE["liggghts"])
     singles = plan.strong * len(plan.mechanisms)
     assert (plan.nulls, singles, plan.pairs) == (40, 48, 12)
-    assert plan.nulls + singles + plan.pairs + plan.strangers * len(STRANGERS) >= 120
+    assert plan.nulls + singles + plan.pairs + plan.outside * len(OUTSIDE) >= 120
     with pytest.raises(InputError, match="liggghts makes only"):
         plan_for("liggghts", Plan(mechanisms=("air_drag",)))
     with pytest.raises(InputError, match="must be one of lammps, liggghts"):
@@ -276,7 +274,7 @@ def test_trials_are_measured_evenly_over_their_classes() -> None:
     rng = np.random.default_rng(3)
     drawn = [(Kind.NULL, ())] * 20 + [(Kind.PAIR, ("a", "b")), (Kind.PAIR, ("a", "c"))] * 3
     drawn += [
-        (kind, (name,)) for kind, name in ((Kind.SINGLE, "a"), (Kind.SINGLE, "b"), (Kind.STRANGER, "d"))
+        (kind, (name,)) for kind, name in ((Kind.SINGLE, "a"), (Kind.SINGLE, "b"), (Kind.OUTSIDE, "d"))
     ] * 4
     labels = [
         Label(f"t-{n:02d}", drawn[at][0], (), tuple((name, 1.0) for name in drawn[at][1]), (), n, "")
@@ -327,7 +325,7 @@ def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) 
 @with_programs
 def test_a_code_makes_every_effect(code: str, tmp_path: Path) -> None:
     left = {name: _largest(name) for name in MADE[code]}
-    left |= {name: effect.maximum for name, effect in STRANGERS.items()}
+    left |= {name: effect.maximum for name, effect in OUTSIDE.items()}
     # so few grains may leave no heap that can be read: another filling decides then
     for seed in (12, 13, 14, 15):
         effects = tuple(((name, size),) for name, size in left.items())

@@ -1,7 +1,5 @@
 """A record of a second reality shows what has been analysed, hides the rest, and can be gone on from."""
 
-from __future__ import annotations
-
 import io
 import tarfile
 from pathlib import Path

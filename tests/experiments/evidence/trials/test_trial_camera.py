@@ -1,7 +1,5 @@
 """Views of a trial: the camera's errors, and the observables that an analysis has in each."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

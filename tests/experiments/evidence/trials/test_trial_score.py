@@ -1,7 +1,5 @@
 """The score of the trials counts what it says, and its page shows it."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -59,7 +57,7 @@ def label_of(kind: Kind, *names: str, multiple: float = 2.0) -> Label:
         (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag spread", "wrong"),
         (label_of(Kind.WITHHELD, "drag"), Verdict.UNKNOWN, "", ""),
         (label_of(Kind.WITHHELD, "drag"), Verdict.NAMED, "twist", "wrong"),
-        (label_of(Kind.STRANGER, "swollen"), Verdict.NAMED, "drag", "wrong"),
+        (label_of(Kind.OUTSIDE, "swollen"), Verdict.NAMED, "drag", "wrong"),
     ],
 )
 def test_a_verdict_is_judged_by_what_it_names(
@@ -85,7 +83,7 @@ def ideal_trials() -> tuple[pd.DataFrame, dict[str, Label]]:
         for name in "abcdefgh"
         for i in range(15)
     }
-    labels |= {f"outside-{i}": label_of(Kind.STRANGER, "swollen") for i in range(60)}
+    labels |= {f"outside-{i}": label_of(Kind.OUTSIDE, "swollen") for i in range(60)}
     labels |= {f"pair-{i}": label_of(Kind.PAIR, "a", "b") for i in range(30)}
     return findings_table(ideal(name, label) for name, label in labels.items()), labels
 
@@ -93,7 +91,7 @@ def ideal_trials() -> tuple[pd.DataFrame, dict[str, Label]]:
 def ideal(trial: str, label: Label) -> Finding:
     if label.kind is Kind.NULL:
         return Finding(trial, EVERYTHING, "none")
-    if label.kind is Kind.STRANGER:
+    if label.kind is Kind.OUTSIDE:
         return Finding(trial, EVERYTHING, "unknown", alarm=True)
     held_out = {"held_out_before": 112.0, "held_out_after": 22.0, "held_out_degrees": 12.0}
     missed = int(trial.rpartition("-")[2]) % 10 == 0  # a 90 % interval misses one in ten
@@ -120,7 +118,7 @@ def test_an_analysis_that_is_right_passes_every_aim() -> None:
     [
         (Kind.NULL, "named", "a", {"nothing hidden: alarms", "nothing hidden: wrong names"}),
         (
-            Kind.STRANGER,
+            Kind.OUTSIDE,
             "named",
             "twist",
             {"outside the library: unknown", "names that were declared not resolvable"},
@@ -171,11 +169,11 @@ def test_unknown_has_the_area_of_its_misfits() -> None:
     findings, labels = ideal_trials()
     assert unknown_area(scored(findings, labels, [])) == ""  # as older records, without a score
     kinds = findings["trial"].map({trial: label.kind for trial, label in labels.items()})
-    told = findings.assign(misfit=kinds.map({Kind.STRANGER: 3.0, Kind.SINGLE: 1.0, Kind.PAIR: 2.0}))
-    assert unknown_area(scored(told, labels, [])).startswith("1.000")
+    changed = findings.assign(misfit=kinds.map({Kind.OUTSIDE: 3.0, Kind.SINGLE: 1.0, Kind.PAIR: 2.0}))
+    assert unknown_area(scored(changed, labels, [])).startswith("1.000")
     # half of what the library lacks raised no alarm: it is behind all the others
-    told.loc[kinds == Kind.STRANGER, "misfit"] = [3.0, float("nan")] * 30
-    assert unknown_area(scored(told, labels, [])).startswith("0.500")
+    changed.loc[kinds == Kind.OUTSIDE, "misfit"] = [3.0, float("nan")] * 30
+    assert unknown_area(scored(changed, labels, [])).startswith("0.500")
 
 
 def test_findings_without_a_misfit_are_read_as_older_ones(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """Blind trials: what is hidden stays hidden, waves find their way home, and the score counts what it says."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -66,17 +64,17 @@ LIBRARY = (
     Declared("drag", null=0.0, maximum=1.0, detectable=0.9),
     Declared("twist", null=0.0, maximum=1.0),
 )
-STRANGERS = (Declared("swollen", null=1.0, maximum=1.3),)
-PLAN = Plan(nulls=3, strong=2, weak=2, unresolved=2, withheld=2, strangers=2, pairs=6)
+OUTSIDE = (Declared("swollen", null=1.0, maximum=1.3),)
+PLAN = Plan(nulls=3, strong=2, weak=2, unresolved=2, withheld=2, outside=2, pairs=6)
 
 
 def draw_trials(seed: int = 1, plan: Plan = PLAN) -> tuple[tuple[Label, Sealed], ...]:
-    return draw(plan, FACTORS, LIBRARY, STRANGERS, np.random.default_rng(seed), lambda: "salt")
+    return draw(plan, FACTORS, LIBRARY, OUTSIDE, np.random.default_rng(seed), lambda: "salt")
 
 
 def test_a_plan_may_hide_some_of_the_library_only() -> None:
     trials = draw_trials(plan=replace(PLAN, mechanisms=["cohesion", "spread"]))
-    hidden = {name for label, _ in trials if label.kind != Kind.STRANGER for name, _ in label.sizes}
+    hidden = {name for label, _ in trials if label.kind != Kind.OUTSIDE for name, _ in label.sizes}
     assert hidden == {"cohesion", "spread"}
     with pytest.raises(InputError, match="mechanisms of the library"):
         draw_trials(plan=replace(PLAN, mechanisms=["cohesoin"]))
@@ -90,14 +88,14 @@ def test_every_kind_of_trial_is_drawn_as_planned() -> None:
         Kind.SINGLE: 3 * 4,
         Kind.UNRESOLVED: 2 * 2,
         Kind.WITHHELD: 3 * 2,
-        Kind.STRANGER: 2,
+        Kind.OUTSIDE: 2,
         Kind.PAIR: 6,
     }
     assert {kind: kinds.count(kind) for kind in Kind} == expected
 
 
 def test_truths_lie_in_their_ranges() -> None:
-    effects = {effect.name: effect for effect in (*LIBRARY, *STRANGERS)}
+    effects = {effect.name: effect for effect in (*LIBRARY, *OUTSIDE)}
     for label, _ in draw_trials():
         assert all(f.low <= value <= f.high for f, value in zip(FACTORS, label.theta, strict=True))
         for name, size in label.sizes:
@@ -256,7 +254,7 @@ def test_what_is_declared_comes_back_with_its_hash(tmp_path: Path) -> None:
     }
     settings = with_names(settings, library)
     assert settings.resolvable == ("beta", "gamma", "delta", "epsilon", "zeta")
-    declaration = Declaration("Grain", "bench", "2026-01-01", PLAN, settings, library, STRANGERS)
+    declaration = Declaration("Grain", "bench", "2026-01-01", PLAN, settings, library, OUTSIDE)
     path = tmp_path / "declared.json"
     declaration.write(path)
     assert read_declaration(path) == declaration

@@ -1,7 +1,5 @@
 """The generator on the engine: a trial with nothing hidden, and one with rolling resistance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Heaps in a row, at one scale."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import cv2

@@ -1,15 +1,13 @@
-"""The record of the paper's runs: gathered from the folders that made it, its page written anew.
+r"""The record of the paper's runs: gathered from the folders that made it, its page written anew.
 
     python -m experiments.evidence.studies.buckwheat --campaign --scale paper --out out/paper
     python -m experiments.evidence.studies.buckwheat --scale bench --out out/bench
-    python -m experiments.evidence.studies.buckwheat.records.paper_record --paper out/paper \\
+    python -m experiments.evidence.studies.buckwheat.records.paper_record --paper out/paper \
         --smaller bench=out/bench
 
 Without a folder it writes the page again from the tables of the record. The record lies in
 ``experiments/evidence/studies/buckwheat/record``.
 """
-
-from __future__ import annotations
 
 import json
 from pathlib import Path

@@ -7,8 +7,6 @@ Without a folder it writes the page again from the cases of the record, which li
 ``experiments/evidence/studies/buckwheat/point``: the campaign's statistics are repeated on them.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The paper's runs simulated again, analysed as the paper analyses its own, and held against them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,13 +1,9 @@
-"""Tables and chart of the paper's runs simulated again, next to the published angles and their analysis."""
-
-from __future__ import annotations
+"""Tables of the paper's runs simulated again, next to the published angles and their analysis."""
 
 import pandas as pd
 
-from doe.plots.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from experiments.evidence.studies.buckwheat.replay.replay import COURSE, Replay, published_noise
 from experiments.evidence.studies.buckwheat.replay.runs import TABLES
-from experiments.report.kit.chart import Chart, add_line, add_points, new_figure
 from experiments.report.kit.numbers import estimate, fixed, p_clause
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.report.stage_tables import comparison_facts, p_marks
@@ -186,25 +182,3 @@ def ranking_sentence(replay: Replay) -> str:
         f"The two strongest factors of the screening are {' and '.join(ours)} here ({values}), "
         f"{' and '.join(theirs)} in the paper."
     )
-
-
-def replay_chart(replay: Replay) -> Chart:
-    """Draw the angles of the paper's runs, simulated again, against the published ones."""
-    runs = replay.runs.dropna(subset=["angle"])
-    figure = new_figure("published angle [°]", "simulated again [°]")
-    ends = [float(runs[["published", "angle"]].min().min()), float(runs[["published", "angle"]].max().max())]
-    add_line(figure, ends, ends, "equal", MUTED, "dot")
-    colors = dict(zip(TABLES, (BLUE, VERMILION, GREEN, PURPLE), strict=True))
-    for stage, points in runs.groupby("stage", sort=False):
-        spread = {"type": "data", "array": points["sd"].fillna(0.0).to_list(), "thickness": 1}
-        add_points(
-            figure,
-            points["published"],
-            points["angle"],
-            TABLES[str(stage)],
-            colors[str(stage)],
-            error_y=spread,
-            text=[f"run {run}" for run in points["run"]],
-        )
-    caption = "Mean angle of each run against the published one; bars: ± 1 sd over its heaps."
-    return Chart("replay-chart", caption, figure, height="tall")

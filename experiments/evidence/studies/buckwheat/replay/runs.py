@@ -1,7 +1,5 @@
 """The paper's simulated runs: every design point that it prints an angle for, to be simulated again."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import pandas as pd

@@ -5,8 +5,6 @@ mechanisms and pairs have a quarter each, shared evenly (Scott and Berger 2010: 
 alarm). Beyond `ODDS` (Kass and Raftery 1995) it raises an alarm, or names.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import logsumexp
 

@@ -4,8 +4,6 @@ BIC = -2 log L + k log n, n being the number of the means. Minus half of it appr
 evidence; a difference of 6 is *strong* (Raftery 1995).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import logsumexp
 

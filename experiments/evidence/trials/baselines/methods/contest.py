@@ -1,11 +1,9 @@
-"""From the weights of models to an answer, for methods that compare them.
+"""Answers from the weights of models, for methods that compare them.
 
 Such a comparison says which model is best, and not that it is good. So the best is also checked by the sum
 of squares of its residuals, as the authors of both criteria ask (Gelman, Meng and Stern 1996; Burnham and
 Anderson 2002): a model that fails is not named, and what is missing is said to be unknown.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from math import comb
@@ -26,7 +24,7 @@ def surprise(q: float, freedom: int) -> float:
 
 
 def prior_of_one(count: int) -> dict[int, float]:
-    """Probability of one model of a number of mechanisms, of so many in the library, if any is right.
+    """Probability of one model of a number of mechanisms from the library, if any is right.
 
     Single ones have half, pairs half, shared evenly (Scott and Berger 2010).
     """

@@ -8,10 +8,8 @@ says that something is missing and names nothing.
 
 Factors are uniform in their ranges with the variance that this has, taken as normal; sigma is uniform in its
 logarithm over what data of this kind can show and what would be gross (Brynjarsdottir and O'Hagan 2014 ask
-for such a prior: with none, factors and discrepancy are not told apart), rho over three values.
+for such a prior: without one, factors and discrepancy cannot be separated), rho over three values.
 """
-
-from __future__ import annotations
 
 from itertools import product
 
@@ -25,7 +23,7 @@ from experiments.evidence.trials.baselines.protocol import ODDS, Answer, Problem
 SIGMAS = tuple(2.0 ** np.arange(-3.0, 3.1, 0.5))
 CORRELATIONS = (0.0, 0.5, 0.9)
 PRIOR_VARIANCE = 1.0 / 3.0
-"""Of a coded factor, uniform from -1 to 1."""
+"""Variance of a coded factor, uniform from -1 to 1."""
 
 
 class Discrepancy:

@@ -161,7 +161,7 @@ def _trained(drawn: Drawn) -> CategoricalMassEstimator:
 
 
 def _posterior(network: CategoricalMassEstimator, means: np.ndarray, count: int) -> np.ndarray:
-    """Probabilities of so many models by the network, of the means (means,), (models,)."""
+    """Probabilities of the models by the network at the means (means,), (models,)."""
     import torch
 
     numbers = torch.arange(count, dtype=torch.float32)[:, None]

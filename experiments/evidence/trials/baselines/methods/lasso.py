@@ -7,8 +7,6 @@ Javanmard and Montanari 2014): with fewer columns than rows that is least square
 correction keeps the level over all mechanisms.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

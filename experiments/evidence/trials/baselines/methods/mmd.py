@@ -7,8 +7,6 @@ distance of the measured means is compared with those of further draws. Without 
 summaries the means are the summaries, each in its standard deviation. It names nothing.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.distance import cdist
 
@@ -16,7 +14,7 @@ from doe.discrepancy.fitting.fitted_model import Stack
 from experiments.evidence.trials.baselines.protocol import LEVEL, Answer, Problem
 
 DRAWS = 200
-"""Of the prior."""
+"""Number of draws from the prior."""
 
 
 class Mmd:

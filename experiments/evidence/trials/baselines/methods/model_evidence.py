@@ -6,8 +6,6 @@ of the optimum; a last step weighs some particles by the likelihood whose covari
 parameters.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

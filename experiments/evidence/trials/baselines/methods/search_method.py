@@ -1,7 +1,5 @@
 """The search of this project: with fresh runs of the simulator, or on the bank alone."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -35,7 +33,7 @@ class Search:
 def answer_of(found: Discovery) -> Answer:
     """Reduce a discovery to an answer.
 
-    The alarm's score is minus the logarithm of the base's p value, which a bootstrap of so many draws bounds,
+    The alarm's score is minus the logarithm of the base's p value, bounded by the number of bootstrap draws,
     and beyond it Q over its degrees of freedom. That of *outside* is the same of the best candidate.
     """
     if found.base is None:
@@ -53,10 +51,10 @@ def answer_of(found: Discovery) -> Answer:
 
 
 def no_runs(observables: int) -> Simulator:
-    """Answer as a published bank does, beside which no simulator stands."""
+    """Answer as a published bank does, which has no simulator."""
 
     def answer(points: Sequence[Point]) -> Outcomes:
         values = np.full((len(points), observables), np.nan)
-        return Outcomes(values, ("no simulator stands beside a published bank",) * len(points))
+        return Outcomes(values, ("a published bank has no simulator",) * len(points))
 
     return answer

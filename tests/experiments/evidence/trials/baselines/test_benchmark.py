@@ -1,7 +1,5 @@
 """The released benchmark, the command that answers it, and the record of answers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

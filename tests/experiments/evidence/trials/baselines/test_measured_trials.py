@@ -1,7 +1,5 @@
 """Trials with measured heaps, as other methods than the search meet them, and their records."""
 
-from __future__ import annotations
-
 import shutil
 import zlib
 from dataclasses import replace

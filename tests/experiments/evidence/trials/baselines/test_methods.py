@@ -1,7 +1,5 @@
 """Each method on worlds whose truth is known: closed forms, sparse truths, a strong effect and none."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -98,7 +96,7 @@ def test_the_evidence_of_a_linear_model_is_its_integral_over_the_prior() -> None
     found = discrepancy.log_evidence(Line(slopes, target), np.array([0.2, 0.1]), covariance)
     x = np.sqrt(discrepancy.PRIOR_VARIANCE) * rng.standard_normal((200_000, 2))
     logs = stats.multivariate_normal(np.zeros(5), covariance).logpdf(target - x @ slopes.T)
-    # The mean of so many weights has a relative error of some 0.005.
+    # The mean of these weights has a relative error of some 0.005.
     assert found == pytest.approx(logsumexp(logs) - np.log(len(x)), abs=0.03)
 
 
