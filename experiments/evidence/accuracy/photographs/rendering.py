@@ -178,19 +178,6 @@ def sharp_shadow(
     """Share of a small lamp, 0 to 1, that the grains hide from each place around the heap or behind it.
 
     The grains are drawn as the lamp sees them; each place looks there whether one is in its way.
-
-    Parameters
-    ----------
-    place : (rows, columns, 3) array
-        Places on table and wall, in heap radii.
-    source : (float, float, float)
-        Place of the lamp.
-    softness : float
-        Blur of the shadow's edge.
-    spheres
-        Centres (n, 3) and radii (n,).
-    camera : PhoneCamera
-        Tells how finely to draw.
     """
     centers, radii = spheres
     lamp = np.array(source)

@@ -73,17 +73,7 @@ def upper_edge(centers: np.ndarray, radii: np.ndarray, places: np.ndarray, radiu
 
 
 def area_of_disagreement(places: np.ndarray, a: np.ndarray, b: np.ndarray, radius: float) -> float:
-    """Area where one of two beds is and the other is not, inside r2 < 0.6 R2 [m2].
-
-    Parameters
-    ----------
-    places : (k,) array
-        Across the drum, ascending [m].
-    a, b : (k,) arrays
-        Heights of their upper edges there [m]; beyond the ends they go on level.
-    radius : float
-        Of the drum [m].
-    """
+    """Area where one of two beds is and the other is not, inside r2 < 0.6 R2 [m2]."""
     reach = np.sqrt(COUNTED) * radius
     x = np.arange(-reach + PIXEL / 2, reach, PIXEL)
     half = np.sqrt(reach**2 - x**2)

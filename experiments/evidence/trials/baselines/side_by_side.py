@@ -17,15 +17,7 @@ from experiments.evidence.trials.score import auroc, share
 
 
 def side_by_side(records: Mapping[str, pd.DataFrame], reference: str) -> pd.DataFrame:
-    """One row a method and record, in the order of the first record's methods, as text.
-
-    Parameters
-    ----------
-    records : mapping
-        Judged answers by the name of their heaps.
-    reference : str
-        Method that every other is compared with.
-    """
+    """One row a method and record, in the order of the first record's methods, as text."""
     names = dict.fromkeys(name for table in records.values() for name in table["method"])
     rows = []
     for name in names:

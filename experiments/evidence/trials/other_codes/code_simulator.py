@@ -25,17 +25,6 @@ class OtherCodeSimulator(EngineSimulator):
     """Answers points of a trial with the observables of tests that another code ran in its own setting.
 
     Points may name mechanisms of the library and effects that it lacks.
-
-    Parameters
-    ----------
-    study
-        The trial study.
-    code
-        Name of the code.
-    setting
-        That of the trial.
-    table, workers
-        As of `EngineSimulator`.
     """
 
     def __init__(

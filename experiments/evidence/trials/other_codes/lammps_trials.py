@@ -228,11 +228,6 @@ def surface_energy(work: float) -> float:
     """Surface energy [J/m2] with which LAMMPS's ``dmt`` holds spheres as JKR does.
 
     Its contact holds 4 pi g R*, JKR's 3/2 pi W R*.
-
-    Parameters
-    ----------
-    work
-        Of adhesion, W [J/m2].
     """
     return 0.375 * work
 

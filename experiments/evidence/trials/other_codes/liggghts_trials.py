@@ -182,13 +182,6 @@ def energy_density(work: float, radius: float, modulus: float) -> float:
 
     Its attraction is k 2 pi R* d, against Hertz's 4/3 E* sqrt(R*) d^(3/2); their sum pulls by
     (2 pi R* k)^3 / (6.75 K^2) at the most, K = 4/3 E* sqrt(R*). JKR's contact holds 3/2 pi W R*.
-
-    Parameters
-    ----------
-    work
-        Of adhesion, W [J/m2].
-    radius, modulus
-        Radius of both spheres [m], effective modulus E* [Pa].
     """
     reduced = radius / 2.0
     stiffness = 4.0 / 3.0 * modulus * math.sqrt(reduced)

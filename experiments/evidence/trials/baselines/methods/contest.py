@@ -37,15 +37,6 @@ def judged(
     """Name every mechanism that has such odds to be in the model (Barbieri and Berger 2004).
 
     Where none has, single mechanisms that share them are a tie.
-
-    Parameters
-    ----------
-    problem : Problem
-    score, limit : float
-        Of the alarm.
-    weights : mapping
-        Probabilities of the models with mechanisms, if one of them is right; they sum to 1.
-    odds : float
     """
     best = problem.fitted(max(weights, key=weights.__getitem__))
     against = surprise(best.q, best.freedom)
