@@ -153,21 +153,16 @@ def test_an_interrupted_case_goes_on_in_the_middle(
     pd.testing.assert_frame_equal(resumed, whole, check_exact=True)
 
 
-def test_a_failed_case_is_a_row(small_study: Study, engine: Engine, tmp_path: Path) -> None:
+def test_a_failed_case_is_a_row_and_not_run_again(small_study: Study, engine: Engine, tmp_path: Path) -> None:
     engine.endings = {20: ("diverged", "too fast"), 30: ("failed", "not at rest")}
     results = run_cases(small_study, table_of([0.3, 0.4, 0.5]), Store(tmp_path))
     assert list(results["status"]) == ["finished", "diverged", "failed"]
     assert list(results["reason"]) == ["", "too fast", "not at rest"]
     assert list(results["angle"].isna()) == [False, True, True]
-
-
-def test_a_failed_case_is_not_simulated_again(small_study: Study, engine: Engine, tmp_path: Path) -> None:
-    engine.endings = {20: ("diverged", "too fast"), 30: ("failed", "not at rest")}
-    first = run_cases(small_study, table_of([0.3, 0.4, 0.5]), Store(tmp_path))
     engine.endings = {}
     again = run_cases(small_study, table_of([0.3, 0.4, 0.5]), Store(tmp_path))
     assert len(engine.batches) == 1
-    pd.testing.assert_frame_equal(again, first)
+    pd.testing.assert_frame_equal(again, results)
 
 
 def test_settings_that_are_not_physical_are_a_row(small_study: Study, engine: Engine, tmp_path: Path) -> None:

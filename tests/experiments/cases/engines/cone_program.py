@@ -40,10 +40,6 @@ def main(way=""):
     match mode:
         case "nan":
             Path("heap.csv").write_text("x,y,z,r\n0,0,nan,0.001\n", encoding="utf-8")
-        case "words":
-            Path("heap.csv").write_text("x,y,z,r\n0,0,high,0.001\n", encoding="utf-8")
-        case "columns":
-            Path("heap.csv").write_text("x,y,z\n0,0,0\n", encoding="utf-8")
         case "high":
             Path("heap.csv").write_text("x,y,z,r\n0,0,0.1,0.001\n", encoding="utf-8")
         case "diverged":
