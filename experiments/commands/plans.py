@@ -28,13 +28,10 @@ def show_plan(plan: Plan, as_json: bool) -> NoReturn:
         numbers = (f"{number:,}" for number in (batch.cases, batch.most, batch.grains, batch.steps))
         table.add_row(batch.name, *numbers, _time(batch.seconds))
     Console(markup=False).print(table)
-    known = totals["seconds"] is not None
-    sources = "; ".join(
-        dict.fromkeys(batch.source for batch in plan.batches if known or batch.seconds is None)
-    )
+    seconds, source = totals["seconds"], totals["source"]
     what = "of each GPU" if plan.on_gpu else "of this machine"
     typer.echo(f"Total: {totals['cases']:,} cases, at most {totals['most']:,}.")
-    time = f"{_time(totals['seconds'])} ({sources})" if known else sources
+    time = source if seconds is None else f"{duration(seconds)}, {source}"
     typer.echo(f"Time: {time}. Not counted: compiling kernels that are new here, 5 to 15 s, once.")
     typer.echo(f"Memory {what}: {_bytes(plan.memory)}. Disk: at most {_bytes(plan.disk)}.")
     typer.echo("Nothing was run, nothing was written.")

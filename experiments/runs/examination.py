@@ -25,7 +25,7 @@ from dem_warp import (
 )
 from dem_warp.device import resolve_device
 from experiments.cases import Resources, open_workers
-from experiments.cases.forecast.speed import UNKNOWN, Speed, noted_speed
+from experiments.cases.forecast.speed import UNKNOWN, noted_speed, source_of
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.submissions import submit_command
 from experiments.io.program_version import program_version
@@ -182,7 +182,7 @@ def _submission(resources: Resources) -> list[Finding]:
     return [Finding("jobs", place is not None, text, needed=True)]
 
 
-def _speed_text(speed: Speed | None) -> str:
+def _speed_text(speed: tuple[float, tuple[int, ...]] | None) -> str:
     if speed is None:
         return f"{UNKNOWN}; --measure simulates one"
-    return f"{speed.value / 1.0e6:.3g} million sphere-steps/s a worker, {speed.source}"
+    return f"{speed[0] / 1.0e6:.3g} million sphere-steps/s a worker, {source_of(speed[1])}"

@@ -16,8 +16,8 @@ from doe.discrepancy import bank_points
 from experiments.calibrate.screening_stage import screening_design
 from experiments.calibrate.stages import plan_opening
 from experiments.cases import Resources
-from experiments.cases.forecast.speed import UNKNOWN, forecast
-from experiments.cases.forecast.work import work_of
+from experiments.cases.forecast.speed import UNKNOWN, forecast, source_of
+from experiments.cases.forecast.work import rest_of, work_of
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.fresh_cases import cases_for
@@ -50,13 +50,13 @@ class PlannedBatch:
     steps: int
     seconds: float | None
     """Expected wall time [s]; None where it is unknown."""
-    source: str
-    """Where the time comes from."""
+    noted: tuple[int, ...]
+    """Numbers of the noted batches that the time comes from."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A command's batches on some workers; memory of this machine or of each GPU, and disk, in bytes."""
+    """A command's batches on some workers, and then its rest; memory (of each GPU) and disk in bytes."""
 
     study: str
     where: str
@@ -66,12 +66,15 @@ class Plan:
     on_gpu: bool
 
     @property
-    def totals(self) -> dict[str, float | None]:
-        """Expected cases, the most cases, and the expected wall time [s]; None where one is unknown."""
+    def totals(self) -> dict[str, Any]:
+        """Expected cases, the most cases, the expected wall time [s] or None, and where it comes from."""
         seconds = [batch.seconds for batch in self.batches]
         known = None if None in seconds else float(sum(each or 0.0 for each in seconds))
         cases, most = (sum(getattr(batch, name) for batch in self.batches) for name in ("cases", "most"))
-        return {"cases": cases, "most": most, "seconds": known}
+        source = source_of({number for batch in self.batches[:-1] for number in batch.noted})
+        if known is None:
+            source = UNKNOWN if None in seconds[:-1] else "unknown until the first such run"
+        return {"cases": cases, "most": most, "seconds": known, "source": source}
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON-able data: seconds and bytes."""
@@ -83,7 +86,7 @@ def plan_calibration(prepared: Prepared) -> Plan:
     study = with_pictures(prepared).study
     stages = _campaign_stages(study)
     grains = max(work_of(case).grains for _, some, *_ in stages for case in some)
-    return _plan(study, prepared.resources, stages, CASE_BYTES + GRAIN_BYTES * grains)
+    return _plan("calibrate", prepared, stages, CASE_BYTES + GRAIN_BYTES * grains)
 
 
 def _campaign_stages(study: Study) -> list[_Stage]:
@@ -125,13 +128,12 @@ def plan_search(prepared: Prepared, given: SearchData) -> Plan:
     stages: list[_Stage] = [] if bank else [("bank", cases, len(points), len(points))]
     if measured is not None:
         stages.append(("fresh runs", cases, *cases_for(search, measured, bank, given.seed)))
-    return _plan(study, prepared.resources, stages, OUTCOME_BYTES)
+    return _plan("bank" if measured is None else "discover", prepared, stages, OUTCOME_BYTES)
 
 
 def plan_heap(prepared: Prepared, case: Case) -> Plan:
     """Plan one case."""
-    stored = GRAIN_BYTES * work_of(case).grains
-    return _plan(prepared.study, prepared.resources, [("heap", [case], 1, 1)], stored)
+    return _plan("heap", prepared, [("heap", [case], 1, 1)], GRAIN_BYTES * work_of(case).grains)
 
 
 def _sampled(study: Study, table: pd.DataFrame) -> list[Case]:
@@ -142,9 +144,11 @@ def _sampled(study: Study, table: pd.DataFrame) -> list[Case]:
     return cases
 
 
-def _plan(study: Study, resources: Resources, stages: Sequence[_Stage], stored: float) -> Plan:
+def _plan(command: str, prepared: Prepared, stages: Sequence[_Stage], stored: float) -> Plan:
+    study, resources = prepared.study, prepared.resources
+    rest = PlannedBatch("start, report", 0, 0, 0, 0, 0, *forecast([rest_of(command)], resources))
     try:
-        batches = tuple(_batch(*stage, resources) for stage in stages)
+        batches = (*(_batch(*stage, resources) for stage in stages), rest)
         cases = [case for _, some, *_ in stages for case in some]
         memory = resources.memory(cases, max((stage[3] for stage in stages), default=0))
     except ValueError as error:  # the reason why a case cannot begin
@@ -157,5 +161,5 @@ def _batch(name: str, some: Sequence[Case], count: int, most: int, resources: Re
     works = [work_of(case) for case in some]
     grains, spheres, steps = np.mean([(work.grains, work.spheres, work.steps) for work in works], axis=0)
     repeated = [works[i % len(works)] for i in range(count)]
-    time = forecast(repeated, resources) if count else (0.0, UNKNOWN)
+    time = forecast(repeated, resources) if count else (0.0, ())
     return PlannedBatch(name, count, most, round(grains), round(spheres), round(steps), *time)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
@@ -50,3 +51,5 @@ class RunRequest:
     """Continue the run of the folder: no finished case is simulated again."""
     watch: Watch = lambda title: nullcontext()
     """Opens the display of a batch."""
+    made: float = field(default_factory=time.perf_counter, compare=False)
+    """Time at which it was made, on the clock of `time.perf_counter` [s]."""

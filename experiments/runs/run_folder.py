@@ -9,7 +9,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,8 @@ from dem_warp.version import source_commit
 from doe.errors import RuleError
 from experiments.cases import Store, Workers, open_folder, open_workers, run_cases
 from experiments.cases.engines.key import engine_identity
+from experiments.cases.forecast.speed import note_batch
+from experiments.cases.forecast.work import rest_of
 from experiments.cases.store.folder import is_used, require_usable
 from experiments.cases.store.outputs import is_listed, publishing
 from experiments.cases.workers.own import watched_by
@@ -55,6 +57,8 @@ class Run:
     workers: Workers
     journal: Journal
     watch: Watch
+    simulated: list[float] = field(default_factory=list)
+    """Time from the start of each batch to its last progress [s]."""
 
     @contextmanager
     def batch(self, title: str, kept: Callable[[], int]) -> Iterator[OnProgress]:
@@ -62,15 +66,18 @@ class Run:
 
         `kept` counts the cases that are kept: if some are added, the wall time of the batch is noted.
         """
-        before, started = kept(), time.perf_counter()
+        before, started, last = kept(), time.perf_counter(), 0.0
         with self.watch(title) as shown, self.journal.batch(title) as noted:
 
             def report(progress: Progress) -> None:
+                nonlocal last
+                last = time.perf_counter() - started
                 noted(progress)
                 if shown is not None:
                     shown(progress)
 
             yield report
+        self.simulated.append(last)
         if not (self.folder / MANIFEST).exists():
             # someone removed the folder meanwhile: a later run can continue from what comes now
             write_manifest(self.folder, self.study)
@@ -108,8 +115,10 @@ class Run:
 
 
 @contextmanager
-def open_run(command: str, prepared: Prepared) -> Iterator[Run]:
+def open_run(command: str, prepared: Prepared, work: str = "") -> Iterator[Run]:
     """Lock the folder of a run, make its workers ready and begin its journal; all end with the block.
+
+    What a run takes apart from its batches is noted under its `work`; default: the command.
 
     Raise InputError when the folder is in use, or is not one to resume, or workers are missing; nothing is
     written then.
@@ -124,7 +133,11 @@ def open_run(command: str, prepared: Prepared) -> Iterator[Run]:
         for change in changes:
             _log.warning("The study has changed since the earlier run: %s", change)
         watched = watched_by(workers, journal.previews)
-        yield Run(study, folder, store, watched, journal, prepared.request.watch)
+        run = Run(study, folder, store, watched, journal, prepared.request.watch)
+        yield run
+        if any(run.simulated) and not resume:
+            rest = time.perf_counter() - prepared.request.made - sum(run.simulated)
+            note_batch([rest_of(work or command)], workers, 1.0, rest)
 
 
 @contextmanager

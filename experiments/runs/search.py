@@ -93,7 +93,7 @@ def run_search(prepared: Prepared, given: SearchData) -> SearchResult:
     terms = Terms.of(search.library, study.measurable, study.factor_sections)
     bank, measured = known_bank(search, prepared.folder, given.bank), read_data(study, given)
     with (
-        open_run("discover", prepared) as run,
+        open_run("discover", prepared, "bank" if measured is None else "discover") as run,
         EngineSimulator(study, search.library, OutcomeTable(run.folder / OUTCOMES), run.workers) as engine,
     ):
         simulator = _ShownSimulator(run, engine)

@@ -1,4 +1,4 @@
-"""The speed of a machine, which every finished batch notes, and the wall time that it makes a batch take."""
+"""Speed of a machine, noted by every finished batch, and the wall time that a batch will take."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import json
 import math
 import os
 import statistics
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from dem_warp import Case
 from experiments.cases.forecast.work import Work, work_of
@@ -33,13 +33,6 @@ NEAR_STEP, NEAR_SIZE, LATEST = 1.5, 2.0, 9
 
 UNKNOWN = "unknown until the first batch"
 """Forecast of a machine on which no like batch has finished."""
-
-
-class Speed(NamedTuple):
-    """Speed of a worker while all are busy [sphere-steps/s], and where the number comes from."""
-
-    value: float
-    source: str
 
 
 @dataclass(frozen=True)
@@ -100,12 +93,12 @@ def _is_possible(load: Load, speed: float) -> bool:
     return all(0.0 < size < math.inf for size in sizes) and 0.0 < speed < FASTEST[load.on_gpu]
 
 
-def note_batch(cases: Sequence[Case[Any]], workers: Workers, part: float, seconds: float) -> None:
+def note_batch(cases: Sequence[Case[Any] | Work], workers: Workers, part: float, seconds: float) -> None:
     """Note the speed of a finished batch, a part of which took a time [s], where it can be true."""
     if seconds < LEAST_SECONDS or part < LEAST_PART:
         return
     try:
-        load = Load.of([work_of(case) for case in cases], workers)
+        load = Load.of([case if isinstance(case, Work) else work_of(case) for case in cases], workers)
         if _is_possible(load, speed := load.sphere_steps * part / seconds):
             rows = [{"load": asdict(one), "speed": value} for one, value in [*noted_batches(), (load, speed)]]
             write_text(_notes(), json.dumps({"format": FORMAT, "batches": rows[-KEPT:]}) + "\n")
@@ -113,19 +106,26 @@ def note_batch(cases: Sequence[Case[Any]], workers: Workers, part: float, second
         return  # a run goes on without a note
 
 
-def noted_speed(machine: str, like: Load | None = None) -> Speed | None:
-    """Return the median speed of a machine's latest batches, or of those like a given one."""
-    rows = [(load, speed) for load, speed in noted_batches() if load.machine.startswith(machine)]
-    speeds = [speed for load, speed in rows if like is None or load.is_like(like)]
-    batches = f"{len(speeds)} {'batch' if len(speeds) == 1 else 'batches'}"
-    return Speed(statistics.median(speeds[-LATEST:]), f"from {batches} on this machine") if speeds else None
+def noted_speed(machine: str, like: Load | None = None) -> tuple[float, tuple[int, ...]] | None:
+    """Return the median speed of a worker [sphere-steps/s], in like batches if one is given; number them."""
+    speeds = {
+        number: speed
+        for number, (load, speed) in enumerate(noted_batches())
+        if load.machine.startswith(machine) and (load.is_like(like) if like else load.spheres > 1.0)
+    }
+    return (statistics.median([*speeds.values()][-LATEST:]), tuple(speeds)) if speeds else None
 
 
-def forecast(works: Sequence[Work], workers: Workers | Resources) -> tuple[float | None, str]:
-    """Predict the wall time of a batch [s], None where it is unknown, and say where it comes from."""
+def source_of(noted: Collection[int]) -> str:
+    """Say that a number comes from some noted batches."""
+    return f"from {len(noted)} {'batch' if len(noted) == 1 else 'batches'} on this machine"
+
+
+def forecast(works: Sequence[Work], workers: Workers | Resources) -> tuple[float | None, tuple[int, ...]]:
+    """Predict the wall time of a batch [s], None where it is unknown, from some noted batches."""
     load = Load.of(works, workers)
     speed = noted_speed(load.machine, load)
-    return (load.sphere_steps / speed.value, speed.source) if speed else (None, UNKNOWN)
+    return (load.sphere_steps / speed[0], speed[1]) if speed else (None, ())
 
 
 def expected_seconds(cases: Sequence[Case[Any]], workers: Workers) -> float | None:

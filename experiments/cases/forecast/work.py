@@ -29,6 +29,11 @@ class Work:
     """Time steps from the first grain to rest."""
 
 
+def rest_of(command: str) -> Work:
+    """Return all that a command does apart from its batches, e.g. its report, as one unit of work."""
+    return Work(command, 1, 1, 1.0, 1.0)
+
+
 def work_of(case: Case[Any]) -> Work:
     """Predict the size of a case; an unknown test counts as one second of a thousand spheres."""
     each, names = case.grains.sphere_count, " + ".join(kind.__name__ for kind in case.kinds)

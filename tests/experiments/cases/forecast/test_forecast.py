@@ -15,14 +15,14 @@ from dem_warp import MECHANISMS, SCENES, simulate
 from experiments.cases import OwnWorkers
 from experiments.cases.forecast import speed
 from experiments.cases.forecast.speed import (
-    UNKNOWN,
     Load,
     expected_seconds,
     forecast,
     note_batch,
     noted_speed,
+    source_of,
 )
-from experiments.cases.forecast.work import Work, work_of
+from experiments.cases.forecast.work import Work, rest_of, work_of
 from experiments.cases.workers.call_results import CallResults, ExpectedProgress
 from experiments.commands.console import describe_progress
 from experiments.studyfile import Study
@@ -89,30 +89,40 @@ def test_the_worlds_of_a_launch_step_together_until_the_last_one_ends() -> None:
 
 
 def note(works: list[Work], workers: Any, seconds: float, part: float = 1.0) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(speed, "work_of", lambda work: work)
-        note_batch(works, workers, part, seconds)  # type: ignore[arg-type]
+    note_batch(works, workers, part, seconds)
 
 
 def test_the_time_is_unknown_until_a_like_batch_has_finished_here() -> None:
-    assert forecast([WORK] * 4, crew()) == (None, UNKNOWN)
+    assert forecast([WORK] * 4, crew()) == (None, ())
     note([WORK] * 4, crew(), 20.0)
-    assert forecast([WORK] * 8, crew()) == (pytest.approx(40.0), "from 1 batch on this machine")
+    assert forecast([WORK] * 8, crew()) == (pytest.approx(40.0), (0,))
     note([WORK] * 4, crew(), 10.0)
-    assert forecast([WORK] * 4, crew()) == (pytest.approx(2.0e8 / 1.5e7), "from 2 batches on this machine")
+    assert forecast([WORK] * 4, crew()) == (pytest.approx(2.0e8 / 1.5e7), (0, 1))
     unlike = (
         replace(WORK, kind="rods"), replace(WORK, spheres=201), replace(WORK, time_step=2.0e-5),
     )  # fmt: skip
     for work in unlike:
-        assert forecast([work] * 4, crew()) == (None, UNKNOWN)
-    assert forecast([WORK], crew(machine="another")) == (None, UNKNOWN)
+        assert forecast([work] * 4, crew()) == (None, ())
+    assert forecast([WORK], crew(machine="another")) == (None, ())
+
+
+@pytest.mark.parametrize("on_gpu", [False, True])
+def test_what_a_command_takes_apart_from_its_batches_is_noted_and_is_no_speed(on_gpu: bool) -> None:
+    workers, rest = crew(2, on_gpu), [rest_of("calibrate")]
+    note([WORK] * 4, workers, 20.0)
+    speeds = noted_speed("this")
+    for seconds in (30.0, 12.0, 12.5):
+        note(rest, workers, seconds)
+    assert forecast(rest, workers)[0] == pytest.approx(12.5)
+    assert forecast([rest_of("heap")], workers) == (None, ())
+    assert noted_speed("this") == speeds
 
 
 def test_a_launch_of_another_size_tells_nothing_of_a_gpu() -> None:
     note([WORK] * 30, crew(1, on_gpu=True), 10.0)
     assert forecast([WORK] * 50, crew(1, on_gpu=True))[0] == pytest.approx(10.0 * 5 / 3)
-    assert forecast([WORK] * 70, crew(1, on_gpu=True)) == (None, UNKNOWN)
-    assert forecast([WORK] * 30, crew(2, on_gpu=True, sharing=2)) == (None, UNKNOWN)
+    assert forecast([WORK] * 70, crew(1, on_gpu=True)) == (None, ())
+    assert forecast([WORK] * 30, crew(2, on_gpu=True, sharing=2)) == (None, ())
 
 
 def test_impossible_speeds_are_not_noted_and_one_outlier_counts_little(notes: Path) -> None:
@@ -135,7 +145,7 @@ def test_a_damaged_file_and_speeds_of_an_earlier_format_are_ignored(notes: Path)
     rows += [{"load": load, "speed": value} for value in (0.0, -1.0, 1.0e12)]
     rows += [{"load": load | {"spheres": 0.0}, "speed": 1.0e7}]
     notes.write_text(json.dumps({"format": 1, "batches": rows}), encoding="utf-8")
-    assert noted_speed("this") == (1.0e7, "from 1 batch on this machine")
+    assert noted_speed("this") == (1.0e7, (0,))
 
 
 def test_a_finished_batch_notes_its_speed(small_study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,18 +154,18 @@ def test_a_finished_batch_notes_its_speed(small_study: Study, monkeypatch: pytes
     workers = OwnWorkers("cpu", 1)
     assert expected_seconds(cases, workers) is None
     workers.simulate(cases)
-    found = noted_speed(workers.machine)
-    assert found is not None
-    assert 1.0e4 < found.value < 1.0e8
+    value, noted = noted_speed(workers.machine) or (0.0, ())
+    assert 1.0e4 < value < 1.0e8
+    assert source_of(noted) == "from 1 batch on this machine"
     assert 0.0 < (expected_seconds(cases, workers) or 0.0) < 600.0
 
 
 def test_cases_that_failed_early_leave_no_speed(small_study: Study) -> None:
-    wave = CallResults([small_study.case({}, 1)], None, None)
-    wave._begun = (0.1, 0.0)
+    call = CallResults([small_study.case({}, 1)], None, None)
+    call._begun = (0.1, 0.0)
     for status, part in (("finished", 0.9), ("failed", 0.0)):
-        wave.results = {0: SimpleNamespace(status=status)}  # type: ignore[dict-item]
-        assert wave.pace[0] == pytest.approx(part)
+        call.results = {0: SimpleNamespace(status=status)}  # type: ignore[dict-item]
+        assert call.pace[0] == pytest.approx(part)
 
 
 def test_the_time_left_follows_the_progress_after_a_tenth() -> None:
