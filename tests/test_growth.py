@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PLUGIN = ROOT / "tests" / "plugin" / "grain_magnets"
 PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
-EVIDENCE = shutil.ignore_patterns("__pycache__", "evidence", "*.npz")
+EVIDENCE = shutil.ignore_patterns("evidence", "*.npz")
 
 EXPORTER = """
 from experiments.export.exporter import Exporter
@@ -86,7 +86,8 @@ magnets, corners = {"magnetism": {"magnetic_force": "0.5 mN"}}, {"screening": {"
 study = load_study(trial, "bench", {"mechanism": magnets, "campaign": corners})
 paper = load_study(scale="bench")
 written = {key: value for key, value in paper.document.items() if key != "target"}  # no heap, no angle
-jar = build_study(written | {"scene": {"jar": {"diameter": "28 mm", "height": "28 mm"}}}, Places(paper.file, {}))
+written |= {"scene": {"jar": {"diameter": "28 mm", "height": "28 mm"}}}
+jar = build_study(written, Places(paper.file, {}))
 app(["new", str(trial), "--measured"], standalone_mode=False)
 [measured] = pathlib.Path(".").rglob("*-measured.csv")
 pathlib.Path("ball.txt").write_text("ball", encoding="utf-8")

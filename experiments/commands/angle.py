@@ -58,10 +58,7 @@ def angle(
     ] = None,
     plate_height: Annotated[
         str | None,
-        typer.Option(
-            metavar="LENGTH",
-            help='Plate height in files of spheres, e.g. "2 mm". Default: found.',
-        ),
+        typer.Option(metavar="LENGTH", help='Plate height in files of spheres, e.g. "2 mm". Default: found.'),
     ] = None,
     as_target: Annotated[bool, typer.Option("--target", help="Print a study's \\[target] section.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print the rows as CSV.")] = False,

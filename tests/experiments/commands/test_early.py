@@ -1,5 +1,6 @@
 """Answers before the libraries load: to a wrong study, to ``--help``, to ``new``."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -56,64 +57,55 @@ def wrong_study(folder: Path, kind: str) -> Path:
 
 
 PROGRAM = """
-import sys
+import contextlib, io, json, sys
 from experiments.cli import app
-try:
-    app(sys.argv[1:])
-finally:
-    print("LOADED", *sys.modules)
+found = []
+for words in json.loads(sys.argv[1]):
+    said = io.StringIO()
+    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+        code = app(words, standalone_mode=False)
+    found.append((code, said.getvalue(), [*sys.modules]))
+print(json.dumps(found))
 """
 
 
-def run(*words: str, folder: Path) -> tuple[int, str, set[str]]:
-    """Run a command; return its exit code, what it says of an error, and the modules that it loaded."""
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *words],
-        cwd=folder,
-        env={"PYTHONPATH": str(ROOT), "PATH": ""},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    loaded = set(done.stdout.partition("LOADED")[2].split())
-    assert "experiments.cli" in loaded
-    return done.returncode, done.stderr, loaded
+def run(*commands: list[str], folder: Path) -> list[tuple[int, str, set[str]]]:
+    """Run commands one after another in one process; return exit codes, messages and loaded modules."""
+    words = [sys.executable, "-c", PROGRAM, json.dumps(commands)]
+    environment = {"PYTHONPATH": str(ROOT), "PATH": ""}
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=True)
+    found = [(code, said, set(loaded)) for code, said, loaded in json.loads(done.stdout)]
+    assert all("experiments.cli" in loaded for *_, loaded in found)
+    return found
 
 
-@pytest.mark.parametrize("kind", WRONG)
-def test_a_wrong_study_is_answered_without_simulator_statistics_or_pictures(
-    kind: str, tmp_path: Path
-) -> None:
-    study = wrong_study(tmp_path, kind)
-    code, said, loaded = run("calibrate", study.name, "--out", "out", folder=tmp_path)
-    assert code == 2
-    assert said.startswith("Error:")
-    assert HEAVY & loaded == set()
+def test_a_wrong_study_is_answered_without_simulator_statistics_or_pictures(tmp_path: Path) -> None:
+    commands = []
+    for number, kind in enumerate(WRONG):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        commands.append(["calibrate", str(wrong_study(folder, kind)), "--out", "out"])
+    answers = run(*commands, folder=tmp_path)
+    for kind, (code, said, loaded) in zip(WRONG, answers, strict=True):
+        assert (code, HEAVY & loaded) == (2, set()), kind
+        assert said.startswith("Error:"), kind
     assert not (tmp_path / "out").exists()
 
 
-def test_other_commands_check_a_study_as_early(tmp_path: Path) -> None:
-    study = wrong_study(tmp_path, "a wrong unit")
-    for words in (("heap", study.name), ("discover", study.name, "measured.csv")):
-        code, said, loaded = run(*words, folder=tmp_path)
-        assert (code, HEAVY & loaded) == (2, set())
-        assert "needs a unit of density" in said
-
-
-@pytest.mark.parametrize(
-    "kind",
-    [
-        "more grains than a case can have",
-        "a tube that too many grains fill",
-        "a tube narrower than two grains",
-    ],
-)
-def test_a_heap_that_cannot_be_is_refused_as_early(kind: str, tmp_path: Path) -> None:
-    study = wrong_study(tmp_path, kind)
-    code, said, loaded = run("heap", study.name, "--seed", "2", folder=tmp_path)
-    assert (code, HEAVY & loaded) == (2, set())
-    assert "grains" in said
-    assert "scene" in said
+def test_other_commands_check_a_study_and_a_heap_as_early(tmp_path: Path) -> None:
+    study = wrong_study(tmp_path, "a wrong unit").rename(tmp_path / "unit.toml")
+    commands = [["heap", study.name], ["discover", study.name, "measured.csv"]]
+    commands.append(["calibrate", "--engine", "nobody"])
+    heaps = [kind for kind in WRONG if "grains" in kind]
+    for number, kind in enumerate(heaps):
+        wrong_study(tmp_path, kind).rename(tmp_path / f"{number}.toml")
+        commands.append(["heap", f"{number}.toml", "--seed", "2"])
+        (tmp_path / "words.txt").unlink()
+    answers = run(*commands, folder=tmp_path)
+    wanted = [["unit of density"]] * 2 + [["liggghts, lammps, yade"]] + [["grains", "scene"]] * len(heaps)
+    for words, texts, (code, said, loaded) in zip(commands, wanted, answers, strict=True):
+        assert (code, HEAVY & loaded) == (2, set()), words
+        assert all(text in said for text in texts), said
 
 
 def test_settings_may_make_a_heap_of_fewer_grains(tmp_path: Path) -> None:
@@ -133,14 +125,7 @@ high = "20000 m"
         check_campaign(load_study(path))
 
 
-def test_an_engine_that_is_none_is_answered_as_early(tmp_path: Path) -> None:
-    code, said, loaded = run("calibrate", "--engine", "nobody", folder=tmp_path)
-    assert (code, HEAVY & loaded) == (2, set())
-    assert "liggghts, lammps, yade" in said
-
-
-@pytest.mark.parametrize("words", [("--help",), ("calibrate", "--help"), ("new", "mygrain")])
-def test_help_and_a_new_study_read_no_study(words: tuple[str, ...], tmp_path: Path) -> None:
-    code, _, loaded = run(*words, folder=tmp_path)
-    assert code == 0
-    assert (HEAVY | {"numpy"}) & loaded == set()
+def test_help_and_a_new_study_read_no_study(tmp_path: Path) -> None:
+    for code, _, loaded in run(["--help"], ["calibrate", "--help"], ["new", "mygrain"], folder=tmp_path):
+        assert not code
+        assert (HEAVY | {"numpy"}) & loaded == set()

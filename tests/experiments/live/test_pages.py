@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -13,12 +16,13 @@ import trimesh
 from browser import Browser, browsing
 from conftest import OTHER, begin
 
-from dem_warp import CaseResult, Progress
+from dem_warp import Case, CaseResult, Progress
 from experiments import api
 from experiments.cases import Store
 from experiments.live import server
 from experiments.live.server import Place, serving
 from experiments.live.ui.start_routes import ui_app
+from experiments.measurement.case_observables import Observed
 from experiments.studyfile import Study, load_study
 
 pytestmark = pytest.mark.program("chromium")
@@ -132,14 +136,24 @@ def test_a_run_that_was_broken_off_is_shown(
 
 
 def test_a_finished_calibration_is_shown_with_its_report(
-    small_text: str, tmp_path: Path, served: Serve, chromium: Browser
-) -> None:
-    """A real run, from the command's own function, with its stages, tables and report."""
-    study = tmp_path / "small.toml"
-    study.write_text(small_text, encoding="utf-8")
+    small_study: Study, tmp_path: Path, cone: Cone, served: Serve, chromium: Browser,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """A run of the command's own function, with its stages, tables and report, whose heaps are cones."""
+
+    def heaps(cases: Sequence[Case], *, on_result: Callable[[int, CaseResult], None], **_: object) -> None:
+        for number, case in enumerate(cases):
+            angle = 15.0 + 30.0 * case.grain_grain.static_friction + 0.3 * math.sin(12.9898 * case.seed)
+            heap = cone(math.tan(math.radians(angle)), radius=1.5e-3)
+            on_result(number, replace(heap, observables={"angle": angle}))
+
+    def observed(_: object, result: CaseResult, __: object) -> Observed:
+        return Observed(dict(result.observables), SimpleNamespace(se=0.1))  # type: ignore[arg-type]
+
+    monkeypatch.setattr("experiments.cases.workers.own.simulate", heaps)
+    monkeypatch.setattr("experiments.cases.execute.observe", observed)
     folder = tmp_path / "out"
-    found = api.calibrate(study, folder, device="cpu").campaign
-    assert found is not None
+    found = api.calibrate(small_study.file, folder, device="cpu").campaign
     place = served(folder)
     with browsing(chromium, place.url) as browser:
         browser.wait(f"{PAINTED} === 12")

@@ -18,7 +18,6 @@ from conftest import KEY, NAME, OTHER, begin
 from starlette.testclient import TestClient
 
 from dem_warp import CaseResult
-from experiments import api, cases
 from experiments.io.errors import InputError
 from experiments.live import server
 from experiments.live.server import Place, watch_app
@@ -233,14 +232,13 @@ def test_live_serves_the_page_of_the_run(
 
     monkeypatch.setattr(server.Place, "open", lambda port=0: places.append(opened(port)) or places[-1])
     monkeypatch.setattr(server, "can_open_browser", lambda: False)
-    monkeypatch.setattr(api, "calibrate", run)
-    monkeypatch.setattr(api, "discover", run)
-    monkeypatch.setattr(cases, "simulate_heap", run)
+    for place in ("calibration.run_calibration", "search.run_search", "one_heap.run_heap"):
+        monkeypatch.setattr(f"experiments.runs.{place}", run)
     words = [command, small_study.file, "--device", "cpu", "--live", "--out", tmp_path / "out"]
     code, _, shown = dem_warp(*words)
     assert code == 2
     assert "the run has looked" in shown
     assert f"Live: {urls[0]}" in shown
-    assert json.loads(seen[0])["progress"]["state"] == ("running" if command == "heap" else "waiting")
+    assert json.loads(seen[0])["progress"]["state"] == "waiting"
     with pytest.raises(OSError, match="refused"):
         urllib.request.urlopen(urls[0])
