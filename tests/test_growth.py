@@ -112,7 +112,7 @@ def table() -> dict[str, tuple[str, str]]:
 
 @pytest.fixture(scope="module")
 def used(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
-    """Findings of a copy of the tree in everything that was added to it."""
+    """Add everything to a copy of the tree, and use it there."""
     tree = tmp_path_factory.mktemp("tree")
     for package in PACKAGES:
         shutil.copytree(ROOT / package, tree / package, ignore=EVIDENCE)

@@ -170,14 +170,13 @@ def _ended_by_sigterm() -> Iterator[None]:
 
 
 def _is_input(error: ValueError) -> bool:
-    """True if an error is one of bad input, of the libraries that are loaded."""
+    """Check for an error of bad input, of the libraries that are loaded."""
     kinds = [("experiments.io.errors", "InputError"), ("imaging", "PictureError"), ("doe", "DesignError")]
     loaded = (getattr(sys.modules.get(module), name, ()) for module, name in kinds)
     return isinstance(error, tuple(kind for kind in loaded if kind))
 
 
 def _are_lost_workers(error: BrokenExecutor) -> bool:
-    """True if an error is one of lost workers."""
     module = sys.modules.get("experiments.cases.workers.workers")
     return module is not None and isinstance(error, module.WorkersLostError)
 

@@ -28,7 +28,7 @@ from experiments.cases.store.folder import is_used, require_usable
 from experiments.cases.store.outputs import is_listed, publishing
 from experiments.cases.workers.own import watched_by
 from experiments.io.errors import InputError, StoreError
-from experiments.io.files import JOURNAL, LOCK, remove_leftovers, write_text
+from experiments.io.files import JOURNAL, LOCK, remove_leftovers, require_folder, write_text
 from experiments.journal.journal import Journal
 from experiments.runs.choices import Prepared
 from experiments.runs.request import Watch
@@ -149,14 +149,13 @@ def locked(folder: Path, resume: bool = False) -> Iterator[None]:
     """
     _require_free(folder)
     require_usable(folder, resume)
+    require_folder(folder)
     lock, made = FileLock(folder / LOCK, timeout=0), not os.path.lexists(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         lock.acquire()
     except Timeout:
         raise StoreError(str(folder), IN_USE) from None
-    except OSError as error:
-        raise StoreError(str(folder), "cannot be made or written to", error.strerror or "") from error
     try:
         # another run may have come and gone since
         require_usable(folder, resume)

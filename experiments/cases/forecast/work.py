@@ -20,7 +20,7 @@ class Work:
     """Predicted size of a case."""
 
     kind: str
-    """What the case's kernels are compiled for: cases of one kind run at comparable speeds."""
+    """Purpose of the case's kernels: cases of one kind run at comparable speeds."""
     grains: int
     spheres: int
     time_step: float

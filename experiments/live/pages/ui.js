@@ -24,8 +24,8 @@ const PLAIN = ["grain", "scene", "target", "measurement", "numerics", "solver"];
 
 function field(place, initial, hint = "") {
   const id = `field-${place}`, keys = place.split(".");
-  const told = keys.slice(PLAIN.includes(keys[0]) ? -1 : -2).join(" ").replaceAll("_", " ");
-  const words = element("label", { for: id }, told);
+  const label = keys.slice(PLAIN.includes(keys[0]) ? -1 : -2).join(" ").replaceAll("_", " ");
+  const words = element("label", { for: id }, label);
   if (hint) words.append(" ", element("span", { class: "hint" }, hint.replaceAll("`", "")));
   const input = element("input", { type: "text", id, "data-place": place });
   input.value = initial ?? "";
@@ -41,7 +41,7 @@ function fillTest() {
   const test = value("test"), first = [], further = [];
   for (const row of form.tests[test]) {
     const place = `scene.${test}.${row.key}`, initial = found(form.template, place);
-    const left = row.default ? ` Left out: ${row.default}.` : "";
+    const left = row.default ? ` Default: ${row.default}.` : "";
     const made = field(place, initial, `${row.meaning}${left}`);
     (initial !== undefined || row.required ? first : further).push(made);
   }
@@ -119,12 +119,12 @@ async function preview(out = "") {
   views.solid.set(new Float32Array(), new Float32Array(made.faces));
   views.clump.set(new Float32Array(made.spheres));
   const { facts } = made;
-  const told = [`${facts.sphere_count} ${facts.sphere_count === 1 ? "sphere" : "spheres"}`,
+  const parts = [`${facts.sphere_count} ${facts.sphere_count === 1 ? "sphere" : "spheres"}`,
     `volume ${facts.volume_mm3.toFixed(2)} mm³`, facts.mass_mg && `mass ${facts.mass_mg.toFixed(2)} mg`,
     facts.coverage && `covers ${(100 * facts.coverage).toFixed(1)} % of the solid`];
-  byId("clump-words").textContent = told.filter(Boolean).join(", ");
-  byId("clump-advice").textContent = [made.told, made.advice].filter(Boolean).join(" ");
-  show("clump-advice", Boolean(made.told || made.advice));
+  byId("clump-words").textContent = parts.filter(Boolean).join(", ");
+  byId("clump-advice").textContent = [made.description, made.advice].filter(Boolean).join(" ");
+  show("clump-advice", Boolean(made.description || made.advice));
   byId("clump-command").textContent = made.command;
   return made;
 }
@@ -140,23 +140,23 @@ async function measure() {
   }
   photoFolder = folder;
   const fit = document.querySelector('[data-place="measurement.fit"]').value;
-  const told = await ask("angles", { folder, fit });
-  const rows = told.rows.map((row) => [row.picture, row.left, row.right, row.mean, row.se,
+  const measured = await ask("angles", { folder, fit });
+  const rows = measured.rows.map((row) => [row.picture, row.left, row.right, row.mean, row.se,
     [row.reason, ...row.doubts].filter(Boolean).join("; ")]);
   byId("angles").replaceChildren(table(["picture", "left", "right", "mean", "se", "doubts"], rows, "Measured photographs"));
-  byId("angles-mean").textContent = told.mean;
-  byId("angles-command").textContent = told.command;
+  byId("angles-mean").textContent = measured.mean;
+  byId("angles-command").textContent = measured.command;
   show("angles-command", true);
 }
 
 // ---- study file --------------------------------------------------------------------------------------------
 
-function showCheck(told) {
-  const doubts = [told.note, told.doubtful && `Doubtful: ${told.doubtful}`].filter(Boolean).join(" ");
-  byId("draft-note").textContent = told.error ? "" : doubts || "The file keeps every rule.";
-  show("draft-note", !told.error);
-  byId("draft-error").textContent = told.error || "";
-  show("draft-error", Boolean(told.error));
+function showCheck(check) {
+  const doubts = [check.note, check.doubtful && `Doubtful: ${check.doubtful}`].filter(Boolean).join(" ");
+  byId("draft-note").textContent = check.error ? "" : doubts || "The file keeps every rule.";
+  show("draft-note", !check.error);
+  byId("draft-error").textContent = check.error || "";
+  show("draft-error", Boolean(check.error));
 }
 
 async function draft() {
@@ -168,13 +168,13 @@ async function draft() {
   // a draft with an error is shown too, with its error
   const answer = await fetch("api/draft", { method: "POST", headers: { "X-Dem-Warp": "1" },
     body: JSON.stringify({ name: value("name"), values: values(), factors: factors() }) });
-  const told = await answer.json();
-  if (told.text) {
-    byId("text").value = told.text;
-    byId("draft-file").textContent = `${told.file}; you may change it here by hand`;
-    byId("text").dataset.file = told.file;
+  const drafted = await answer.json();
+  if (drafted.text) {
+    byId("text").value = drafted.text;
+    byId("draft-file").textContent = `${drafted.file}; you may change it here by hand`;
+    byId("text").dataset.file = drafted.file;
   }
-  showCheck(told);
+  showCheck(drafted);
 }
 
 const textAsked = () => ({ file: byId("text").dataset.file || `${value("name")}.toml`, text: byId("text").value });
@@ -215,11 +215,11 @@ function runItem(run) {
   const act = (what) => async () => { await ask(what, { folder: run.folder }); await refreshRuns(); };
   if (run.running) buttons.push(element("button", { type: "button", onclick: act("stop") }, "Stop"));
   else if (run.code) buttons.push(element("button", { type: "button", onclick: act("resume") }, "Resume"));
-  const told = [run.left && `${run.left} left.`, run.message].filter(Boolean).join(" ");
+  const status = [run.left && `${run.left} left.`, run.message].filter(Boolean).join(" ");
   const messages = run.code && run.messages ? element("p", { class: "error" }, run.messages.trim()) : null;
   return element("li", { "data-folder": run.folder },
     element("p", {}, element("span", { class: `badge ${run.state}` }, run.state), " ",
-      element("strong", {}, run.folder), " ", told),
+      element("strong", {}, run.folder), " ", status),
     run.command ? element("p", {}, element("code", { class: "command" }, run.command)) : null,
     messages, element("div", { class: "row" }, element("span", { class: "links" }, ...links), ...buttons));
 }

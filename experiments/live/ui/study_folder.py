@@ -126,7 +126,7 @@ class StudyFolder:
         return {
             "facts": made.to_dict(density),
             "advice": made.advice,
-            "told": made.description,
+            "description": made.description,
             "spheres": np.column_stack([spheres, np.zeros(len(spheres))]).ravel().tolist(),
             "faces": [] if made.solid is None else _faces(made.solid),
             "command": self.clump_command(asked),

@@ -107,7 +107,7 @@ class Browser:
         self.call("DOM.setFileInputFiles", files=[str(file) for file in files], nodeId=node)
 
     def picture(self) -> bytes:
-        """The whole page as a PNG."""
+        """Return the whole page as a PNG."""
         found = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=True)
         return base64.b64decode(found["data"])
 

@@ -1,4 +1,4 @@
-"""Folders of runs, as the tests of the pages watch them; and `browser`, which lies beside them."""
+"""Folders of runs, as the tests of the pages watch them."""
 
 from __future__ import annotations
 

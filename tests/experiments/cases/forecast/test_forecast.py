@@ -36,7 +36,7 @@ def notes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "notes" / "batches.json"
 
 
-def crew(count: int = 2, on_gpu: bool = False, sharing: int = 1, machine: str = "this") -> Any:
+def workers_of(count: int = 2, on_gpu: bool = False, sharing: int = 1, machine: str = "this") -> Any:
     return SimpleNamespace(count=count, on_gpu=on_gpu, sharing=sharing, machine=machine)
 
 
@@ -73,15 +73,15 @@ def test_a_case_takes_its_rain_and_the_phases_that_its_test_expects(small_study:
 
 
 def test_cores_share_the_work_and_none_ends_before_its_longest_case() -> None:
-    assert Load.of([WORK] * 8, crew()).sphere_steps == pytest.approx(4.0e8)
+    assert Load.of([WORK] * 8, workers_of()).sphere_steps == pytest.approx(4.0e8)
     long = replace(WORK, steps=9.0e6)
-    assert Load.of([WORK, long], crew()).sphere_steps == pytest.approx(9.0e8)
+    assert Load.of([WORK, long], workers_of()).sphere_steps == pytest.approx(9.0e8)
 
 
 def test_the_worlds_of_a_launch_step_together_until_the_last_one_ends() -> None:
-    load = Load.of([WORK] * 30 + [replace(WORK, steps=2.0e6)], crew(1, on_gpu=True))
+    load = Load.of([WORK] * 30 + [replace(WORK, steps=2.0e6)], workers_of(1, on_gpu=True))
     assert (load.spheres, load.sphere_steps) == (3100.0, pytest.approx(3100 * 2.0e6))
-    two = Load.of([WORK] * 30, crew(2, on_gpu=True))
+    two = Load.of([WORK] * 30, workers_of(2, on_gpu=True))
     assert (two.spheres, two.sphere_steps) == (1500.0, pytest.approx(1500 * 1.0e6))
 
 
@@ -93,22 +93,22 @@ def note(works: list[Work], workers: Any, seconds: float, part: float = 1.0) -> 
 
 
 def test_the_time_is_unknown_until_a_like_batch_has_finished_here() -> None:
-    assert forecast([WORK] * 4, crew()) == (None, ())
-    note([WORK] * 4, crew(), 20.0)
-    assert forecast([WORK] * 8, crew()) == (pytest.approx(40.0), (0,))
-    note([WORK] * 4, crew(), 10.0)
-    assert forecast([WORK] * 4, crew()) == (pytest.approx(2.0e8 / 1.5e7), (0, 1))
+    assert forecast([WORK] * 4, workers_of()) == (None, ())
+    note([WORK] * 4, workers_of(), 20.0)
+    assert forecast([WORK] * 8, workers_of()) == (pytest.approx(40.0), (0,))
+    note([WORK] * 4, workers_of(), 10.0)
+    assert forecast([WORK] * 4, workers_of()) == (pytest.approx(2.0e8 / 1.5e7), (0, 1))
     unlike = (
         replace(WORK, kind="rods"), replace(WORK, spheres=201), replace(WORK, time_step=2.0e-5),
     )  # fmt: skip
     for work in unlike:
-        assert forecast([work] * 4, crew()) == (None, ())
-    assert forecast([WORK], crew(machine="another")) == (None, ())
+        assert forecast([work] * 4, workers_of()) == (None, ())
+    assert forecast([WORK], workers_of(machine="another")) == (None, ())
 
 
 @pytest.mark.parametrize("on_gpu", [False, True])
 def test_what_a_command_takes_apart_from_its_batches_is_noted_and_is_no_speed(on_gpu: bool) -> None:
-    workers, rest = crew(2, on_gpu), [rest_of("calibrate")]
+    workers, rest = workers_of(2, on_gpu), [rest_of("calibrate")]
     note([WORK] * 4, workers, 20.0)
     speeds = noted_speed("this")
     for seconds in (30.0, 12.0, 12.5):
@@ -119,25 +119,25 @@ def test_what_a_command_takes_apart_from_its_batches_is_noted_and_is_no_speed(on
 
 
 def test_a_launch_of_another_size_tells_nothing_of_a_gpu() -> None:
-    note([WORK] * 30, crew(1, on_gpu=True), 10.0)
-    assert forecast([WORK] * 50, crew(1, on_gpu=True))[0] == pytest.approx(10.0 * 5 / 3)
-    assert forecast([WORK] * 70, crew(1, on_gpu=True)) == (None, ())
-    assert forecast([WORK] * 30, crew(2, on_gpu=True, sharing=2)) == (None, ())
+    note([WORK] * 30, workers_of(1, on_gpu=True), 10.0)
+    assert forecast([WORK] * 50, workers_of(1, on_gpu=True))[0] == pytest.approx(10.0 * 5 / 3)
+    assert forecast([WORK] * 70, workers_of(1, on_gpu=True)) == (None, ())
+    assert forecast([WORK] * 30, workers_of(2, on_gpu=True, sharing=2)) == (None, ())
 
 
 def test_impossible_speeds_are_not_noted_and_one_outlier_counts_little(notes: Path) -> None:
-    note([WORK], crew(), 0.01)
-    note([WORK], crew(), 50.0, part=0.1)
-    note([replace(WORK, steps=1.0e9)], crew(), 1.0)
+    note([WORK], workers_of(), 0.01)
+    note([WORK], workers_of(), 50.0, part=0.1)
+    note([replace(WORK, steps=1.0e9)], workers_of(), 1.0)
     assert not notes.exists()
     for seconds in (10.0, 10.0, 200.0):
-        note([WORK], crew(), seconds)
-    assert forecast([WORK], crew())[0] == pytest.approx(10.0)
+        note([WORK], workers_of(), seconds)
+    assert forecast([WORK], workers_of())[0] == pytest.approx(10.0)
 
 
 def test_a_damaged_file_and_speeds_of_an_earlier_format_are_ignored(notes: Path) -> None:
     notes.parent.mkdir()
-    load = asdict(Load.of([WORK], crew()))
+    load = asdict(Load.of([WORK], workers_of()))
     rows: list[Any] = [{"load": load, "speed": 1.0e7}]
     for text in ('{"this": {"step": 1e-7}}', "[]", "{", json.dumps({"format": 0, "batches": rows})):
         notes.write_text(text, encoding="utf-8")
