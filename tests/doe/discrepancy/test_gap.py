@@ -30,7 +30,7 @@ from doe.discrepancy.fitting.measured_means import gather
 from doe.discrepancy.fitting.model_fit import Fitted, fit, weigh
 from doe.discrepancy.fitting.size_interval import coded_size_interval
 
-NULLS = 100
+NULLS = 50
 
 
 def _calibrated(measured: Measured, *mechanisms: str) -> Fitted:
@@ -71,7 +71,7 @@ def test_the_residuals_of_a_small_bank_point_at_no_mechanism() -> None:
     few = Settings(bank_points=24, bank_mechanism_points=12)
     world = replace(space(), mechanisms=tuple(MechanismRange(name, 0.0, 0.3) for name in space().names))
     squares, plain = [], []
-    for seed in range(8):
+    for seed in range(4):
         points = bank_points(world, few, seed)
         bank = make_bank(world, OBSERVABLES, points, SyntheticSimulator(world)(points))
         known = fit_emulator(bank).without("twin")
@@ -81,8 +81,8 @@ def test_the_residuals_of_a_small_bank_point_at_no_mechanism() -> None:
             seen = signatures(fitted)
             squares += list(find_gap(fitted, seen, 0.025, 100, seed).scores ** 2)
             plain += list((seen.directions @ fitted.residuals) ** 2)
-    # 240 squares, six of which hang together: their mean is 1 to .15, and so each bank is.
-    assert np.mean(squares) == pytest.approx(1.0, abs=3.0 * 0.15)
+    # 120 squares, six of which hang together: their mean is 1 to .21, and so each bank is.
+    assert np.mean(squares) == pytest.approx(1.0, abs=3.0 * 0.21)
     # With signatures as they are it is 1.7, and every alarm that they raise is false.
     assert np.mean(plain) > 1.4 * np.mean(squares)
 
@@ -93,13 +93,13 @@ def test_p_values_of_a_complete_model_are_uniform(nulls: list[tuple[float, float
 
 def test_q_has_its_degrees_of_freedom(nulls: list[tuple[float, float]]) -> None:
     freedom = 4 * 12 - 3
-    # Mean of 100 chi2 of 45: four standard errors, and 3 % for the emulator's noise, which all share.
+    # Mean of 50 chi2 of 45: four standard errors, and 3 % for the emulator's noise, which all share.
     tolerance = 4.0 * np.sqrt(2.0 * freedom / NULLS) + 0.03 * freedom
     assert np.mean([q for q, _ in nulls]) == pytest.approx(freedom, abs=tolerance)
 
 
 def test_intervals_of_sizes_cover_the_truth() -> None:
-    covered, count = 0, 60
+    covered, count = 0, 30
     for seed in range(count):
         name = ("alpha", "beta", "gamma", "delta")[seed % 4]
         fitted = _calibrated(measure({name: 0.4}, seed), name)
@@ -249,7 +249,7 @@ def test_the_detectable_size_is_found_and_told_from_the_rest_with_80_percent_pro
     middle = tuple(space().natural_theta(np.zeros(3)))
     visible = _powers(_calibrated(measure({}, 1, theta=middle)))[name]
     size = visible.detectable_size
-    found, count = 0, 40
+    found, count = 0, 20
     for seed in range(count):
         data = measure({name: size}, seed, theta=middle)
         one = _calibrated(data, name)

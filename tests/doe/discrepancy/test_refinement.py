@@ -129,7 +129,7 @@ def test_information_is_larger_than_it_is_by_what_noise_in_the_slopes_feigns() -
     evidence = gather(measure({"delta": 1.0}, 1), emulator()).training
     slopes, feigned = [], []
     precision = np.linalg.inv(Stack(model(), evidence).noise(CENTRE))
-    for seed in range(12):
+    for seed in range(8):
         points = bank_points(known, SETTINGS, seed)
         of_bank = fit_emulator(make_bank(known, OBSERVABLES, points, noisy(points)))
         stack = Stack(Model(of_bank, ("delta",), 0.0), evidence)
@@ -139,9 +139,9 @@ def test_information_is_larger_than_it_is_by_what_noise_in_the_slopes_feigns() -
     own, count = np.einsum("bbp->bp", seeming), len(slopes)
     too_much = own - (seeming.sum(axis=1) - own) / (count - 1)
     error = too_much.std(axis=0, ddof=1) / count**0.5
-    # Student's t of 11 degrees of freedom passes 4.4 in one case of a thousand.
-    assert (np.abs(too_much.mean(axis=0) - np.mean(feigned, axis=0)) < 4.4 * error).all()
-    assert (too_much.mean(axis=0)[:3] > 4.4 * error[:3]).any()
+    # Student's t of 7 degrees of freedom passes 5.4 in one case of a thousand.
+    assert (np.abs(too_much.mean(axis=0) - np.mean(feigned, axis=0)) < 5.4 * error).all()
+    assert (too_much.mean(axis=0)[:3] > 5.4 * error[:3]).any()
 
 
 def test_noise_of_bank_and_fresh_runs_moves_a_corrected_prediction_as_much_as_is_said() -> None:
@@ -151,10 +151,10 @@ def test_noise_of_bank_and_fresh_runs_moves_a_corrected_prediction_as_much_as_is
     of_bank = np.linalg.inv(10.0 * np.eye(terms.shape[1]) + 1.0)
     prior = Prior(1, 1.5 * of_bank[None], of_bank[None], np.array([0.2]), np.array([0.7, 0.35]))
     moved = []
-    for _ in range(4000):
+    for _ in range(2000):
         bank_error = rng.multivariate_normal(np.zeros(len(of_bank)), of_bank)
         missed = rng.normal(0.0, noise**0.5) - (terms @ bank_error)[:, None]
         learnt = condition_on(prior, points, missed, noise, np.eye(1), np.ones(1))
         moved.append(all_terms(at, 1) @ bank_error + learnt.mean(at)[:, 0])
-    # A variance of 4000 has an error of 2.2 %; 5 of them.
-    np.testing.assert_allclose(np.diag(np.cov(np.transpose(moved))), np.diag(learnt.chance(at)[0]), rtol=0.11)
+    # A variance of 2000 has an error of 3.2 %; 5 of them.
+    np.testing.assert_allclose(np.diag(np.cov(np.transpose(moved))), np.diag(learnt.chance(at)[0]), rtol=0.16)

@@ -24,7 +24,10 @@ from doe.discrepancy.analysis import DOUBTED
 from doe.errors import RuleError
 
 ALONE = emulator().without("twin")
-"""The library without the mechanism that cannot be told from another."""
+"""Emulator of a library without the mechanism that acts like another."""
+TWINS = emulator().without("gamma", "epsilon", "zeta")
+FEW = TWINS.without("twin")
+"""Emulators of small libraries, with few pairs to try."""
 
 
 def _run(
@@ -55,7 +58,7 @@ def _named() -> tuple[Discovery, list[list[Point]]]:
 
 @cache
 def _tied() -> tuple[Discovery, list[list[Point]]]:
-    return _run(measure({"alpha": 0.4}, 4), emulator())
+    return _run(measure({"alpha": 0.4}, 4), TWINS)
 
 
 def test_a_complete_model_lacks_nothing_and_costs_no_run() -> None:
@@ -136,7 +139,7 @@ def test_a_leader_runs_at_last_against_what_might_overtake_it() -> None:
 
 def test_twins_of_the_best_pair_are_tried_though_nothing_promises_them() -> None:
     one_pair = replace(SETTINGS, pair_candidates=1)
-    found, _ = _run(measure({"alpha": 0.6, "delta": 0.8}, 5), emulator(), settings=one_pair)
+    found, _ = _run(measure({"alpha": 0.6, "delta": 0.8}, 5), TWINS, settings=one_pair)
     tried = {one.mechanisms: one.simulated for one in found.candidates if len(one.mechanisms) > 1}
     # alpha and its twin are one part in a hundred apart: delta stands out, neither pair does
     assert tried.keys() >= {("alpha", "delta"), ("delta", "twin")}
@@ -167,6 +170,7 @@ def test_a_pair_that_cannot_be_simulated_is_not_named() -> None:
     # What explains the data, but is refused by the study: the emulator alone shall not speak for it.
     found, waves = _run(
         measure({"alpha": 0.6, "delta": 0.8}, 5),
+        FEW,
         is_lost=lambda _, point: dict(point.sizes).keys() == {"alpha", "delta"},
     )
     assert any(dict(point.sizes).keys() == {"alpha", "delta"} for wave in waves for point in wave)
@@ -175,7 +179,7 @@ def test_a_pair_that_cannot_be_simulated_is_not_named() -> None:
 
 
 def test_what_the_library_lacks_is_unknown() -> None:
-    found, _ = _run(measure({"stranger": 1.0}, 6))
+    found, _ = _run(measure({"stranger": 1.0}, 6), FEW)
     assert found.verdict == Verdict.UNKNOWN
     assert found.named == ()
     assert found.before_after == ()
@@ -190,7 +194,7 @@ def test_what_the_library_lacks_is_unknown() -> None:
 
 
 def test_what_cannot_fit_costs_one_look() -> None:
-    _, waves = _run(measure({"stranger": 2.0}, 6))
+    _, waves = _run(measure({"stranger": 2.0}, 6), FEW)
     one_model = SETTINGS.refinement_points * SETTINGS.refinement_repeats * len(CONDITIONS)
     # No mechanism of the library, and not the base, comes near: the best is run to be sure, no other is.
     assert len(waves[0]) == one_model
@@ -202,7 +206,7 @@ def test_a_forecast_that_fails_is_a_gap_though_the_fit_is_good() -> None:
     whole = measure({}, 3)
     values = dict(whole.values)
     values["fast-wide"] = values["fast-wide"] + 3.0 * values["fast-wide"].std(axis=0)
-    found, _ = _run(Measured(CONDITIONS, OBSERVABLES, values))
+    found, _ = _run(Measured(CONDITIONS, OBSERVABLES, values), FEW)
     assert found.verdict == Verdict.UNKNOWN
     assert found.gap is not None
     assert found.gap.found
@@ -215,7 +219,7 @@ def test_one_angle_a_condition_cannot_tell_a_mechanism_from_friction() -> None:
 
 
 def test_without_a_held_out_condition_nothing_is_named() -> None:
-    found, _ = _run(measure({"delta": 0.6}, 3, conditions=CONDITIONS[:4]))
+    found, _ = _run(measure({"delta": 0.6}, 3, conditions=CONDITIONS[:4]), FEW)
     assert found.verdict == Verdict.UNKNOWN
     assert "no held-out condition was measured" in found.reason
     assert "condition fast-wide was not measured" in found.notes
@@ -255,14 +259,14 @@ def test_replicates_that_scatter_too_much_widen_the_error_instead_of_an_alarm() 
 
 
 def test_fresh_runs_that_fail_are_counted_and_left_out() -> None:
-    found, _ = _run(measure({"delta": 0.6}, 3), is_lost=lambda i, _: i < 7)
+    found, _ = _run(measure({"delta": 0.6}, 3), FEW, is_lost=lambda i, _: i < 7)
     assert found.named == ("delta",)
     assert any("fresh runs failed" in note for note in found.notes)
 
 
 def test_what_is_declared_unresolvable_is_never_named() -> None:
-    others = tuple(name for name in ALONE.space.names if name != "delta")
-    found, _ = _run(measure({"delta": 0.6}, 3), settings=replace(SETTINGS, resolvable=others))
+    others = tuple(name for name in FEW.space.names if name != "delta")
+    found, _ = _run(measure({"delta": 0.6}, 3), FEW, settings=replace(SETTINGS, resolvable=others))
     assert found.verdict == Verdict.UNKNOWN
     assert "delta" in found.reason
 

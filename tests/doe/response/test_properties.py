@@ -14,7 +14,7 @@ from doe import (
     fit_surface,
 )
 
-QUICK = settings(max_examples=8, deadline=None, derandomize=True)
+QUICK = settings(max_examples=4, deadline=None, derandomize=True)
 SEEDS = st.integers(0, 2**16)
 
 

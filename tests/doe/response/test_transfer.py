@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from doe import (
     Factor,
@@ -77,7 +78,7 @@ def test_without_an_error_of_the_surface_it_is_least_squares() -> None:
 
 def test_intervals_and_errors_hold_their_level() -> None:
     rng, inside, misses, errors = np.random.default_rng(3), [], [], []
-    for _ in range(120):
+    for _ in range(40):
         surface = source(0.6, rng)
         at = nearest(surface)
         runs = transfer_points(surface, at, 12, extent=1.4)
@@ -90,10 +91,10 @@ def test_intervals_and_errors_hold_their_level() -> None:
         mean, error = found.evaluate(coded)
         misses.append(mean[0] - there(pd.DataFrame([at]))[0])
         errors.append(error[0])
-    # 120 trials of .95: one of a thousand leaves .95 by .065.
-    assert np.mean(inside, axis=0) == pytest.approx(0.95, abs=0.07)
-    # A standard deviation of 120 values is known to 6.5 %.
-    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(misses), rel=0.25)
+    # The number that 40 trials of .95 fall short of in one case of a thousand.
+    assert (np.sum(inside, axis=0) >= stats.binom.ppf(1e-3, 40, 0.95)).all()
+    # A standard deviation of 40 values is known to 11 %; four of those.
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(misses), rel=0.45)
 
 
 def test_the_region_of_the_carried_surface_holds_its_contour() -> None:
@@ -112,9 +113,9 @@ def test_runs_that_tell_nothing_of_the_scale_leave_it_near_one() -> None:
     rng = np.random.default_rng(8)
     surface = source(0.6, rng)
     runs = transfer_points(surface, nearest(surface), 6)
-    scales = [transfer(surface, runs, 26.0 + rng.normal(0.0, 5.0, 6), LEVEL).scale for _ in range(20)]
+    scales = [transfer(surface, runs, 26.0 + rng.normal(0.0, 5.0, 6), LEVEL).scale for _ in range(8)]
     # A run of such noise says next to nothing against a standard deviation of a quarter about 1.
-    assert scales == pytest.approx([1.0] * 20, abs=0.25)
+    assert scales == pytest.approx([1.0] * 8, abs=0.25)
 
 
 def test_runs_lie_there_across_and_along_inside_the_box() -> None:

@@ -56,7 +56,7 @@ def test_a_reduced_surface_covers_the_true_mean() -> None:
     rng = np.random.default_rng(92)
     mean = DESIGN.points.to_numpy() @ [0.6, 0.3] + 0.3 * DESIGN.points.prod(axis=1).to_numpy()
     truth = 0.6 * 0.4 - 0.3 * 0.5 - 0.3 * 0.2
-    trials = 60
+    trials = 30
     inside = 0
     for _ in range(trials):
         row = fit_surface(DESIGN, mean + rng.standard_normal(len(mean))).reduce(0.05).predict(POINT).iloc[0]
@@ -94,7 +94,7 @@ def test_lenths_false_alarms_come_at_the_level(factors: int, runs: int) -> None:
 
 def test_welch_is_the_default_and_the_guarded_test_agrees_with_itself() -> None:
     rng = np.random.default_rng(97)
-    for sizes in ((2, 6), (3, 3), (4, 12)):
+    for sizes in ((2, 6), (4, 12)):
         a, b = (rng.standard_normal(size) for size in sizes)
         plain, guarded = compare_means(a, b, 1.0), compare_means(a, b, 1.0, "guarded")
         assert plain.method == "welch"
