@@ -1,4 +1,4 @@
-"""The version that a run tells, where a tree runs that nobody has installed."""
+"""The version that a run reports, also in a tree that is not installed."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ print(json.dumps(library_versions()))
 """
 
 
-def test_a_run_of_a_tree_without_metadata_tells_the_version_of_the_tree(tmp_path: Path) -> None:
-    told = subprocess.run(
+def test_a_tree_without_metadata_reports_its_own_version(tmp_path: Path) -> None:
+    printed = subprocess.run(
         [sys.executable, "-c", UNINSTALLED], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    versions = json.loads(told.stdout.splitlines()[-1])
+    versions = json.loads(printed.stdout.splitlines()[-1])
     assert versions["dem-warp"] == STATED
 
 
 @pytest.mark.parametrize("project", [None, "[project]\nname = 'another'\nversion = '9'\n", "no TOML", ""])
-def test_without_a_tree_of_its_own_it_is_that_of_the_package(
+def test_without_a_tree_the_version_is_that_of_the_package(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, project: str | None
 ) -> None:
     if project is not None:

@@ -84,12 +84,6 @@ def test_a_wrong_condition_is_named_with_its_line(
     assert key in caught.value.place
 
 
-def test_an_unknown_condition_is_refused_by_name(write_study: WriteStudy) -> None:
-    study = load_study(write_study(add=CONDITIONS))
-    with pytest.raises(StudyError, match="did you mean 'fast'"):
-        study.under("fats")
-
-
 def test_a_factor_may_have_several_places(write_study: WriteStudy) -> None:
     both = '["contact.grain-grain.static_friction", "contact.grain-wall.static_friction"]'
     study = load_study(

@@ -1,4 +1,4 @@
-"""The test that a study is of: each in its own table, and what is said about a wrong one."""
+"""Scenes of a study: each in its own table, and the errors of a wrong one."""
 
 from __future__ import annotations
 
@@ -85,11 +85,9 @@ def test_an_outlet_that_no_grain_passes_is_refused(
     ("section", "key", "rule"),
     [
         (OTHER_TESTS[Hopper].replace('"18 mm"', '"41 mm"'), "scene.hopper", "outlet: must be below"),
-        (OTHER_TESTS[Hopper].replace('"18 mm"', "18"), "scene.hopper.outlet", "unit of length"),
         (OTHER_TESTS[Hopper].replace("hopper", "hoper"), "scene.hoper", "did you mean 'hopper'?"),
         (OTHER_TESTS[Drum].replace("30 1/min", "300 1/min"), "scene.drum", "rotation_rate: must be below"),
         (OTHER_TESTS[Drum] + TUBE, "scene", "must be one of [scene.lifted-cylinder], [scene.hopper]"),
-        ("[scene]\n", "scene", "got 0 of them"),
     ],
 )
 def test_a_test_that_cannot_be_is_named_with_its_place(
@@ -123,9 +121,7 @@ air_drag = "2 1/s"
     ("line", "key", "rule"),
     [
         ('tilt = "90 deg"', "tilt", "must be less than 90"),
-        ("tilt = 3", "tilt", "unit of angle"),
         ('vibration_frequency = "60 1/min"', "vibration_frequency", "unit of frequency (Hz)"),
-        ("plate_friction = -0.1", "plate_friction", "must be greater than or equal to 0"),
         ('air_drag = "-1 1/s"', "air_drag", "must be greater than or equal to 0"),
     ],
 )

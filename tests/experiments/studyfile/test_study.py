@@ -1,9 +1,8 @@
-"""Study files: what they mean in SI, and what is said about a wrong one."""
+"""Study files: their meaning in SI, and the errors of a wrong one."""
 
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from dem_warp.parameters import UNITS as ENGINE_UNITS
 from doe import Sample
 from experiments.io.errors import StudyError
 from experiments.io.units import UNITS, Quantity, dimension_of_unit
-from experiments.studyfile import BUCKWHEAT, load_study, study_scales, write_template
+from experiments.studyfile import load_study, study_scales, write_template
 from experiments.studyfile.campaign import Response, Target
 from experiments.studyfile.schema import Dimension
 
@@ -30,25 +29,6 @@ PAPER_FACTORS = {
     "H": (0.02, 0.09, ""),
 }
 """Table 2 of the paper."""
-
-
-@pytest.mark.parametrize(
-    ("text", "dimension", "expected"),
-    [
-        ("110 mm", "length", 0.110),
-        ("28mm", "length", 0.028),
-        ("70 GPa", "pressure", 7.0e10),
-        ("34.325 MPa", "pressure", 34.325e6),
-        ("1.2 g/cm^3", "density", 1200.0),
-        ("3000 1/s", "rate", 3000.0),
-        ("5e-2 m/s", "speed", 0.05),
-        ("250 ms", "time", 0.25),
-        ("0.5 rad", "angle", math.degrees(0.5)),
-    ],
-)
-def test_quantities_are_read_in_si(text: str, dimension: str, expected: float) -> None:
-    # The nearest double to the decimal value, or one rounding away from it (degrees).
-    assert Quantity.parse(text).to_base(dimension) == pytest.approx(expected, rel=3e-16)
 
 
 def test_every_unit_survives_a_round_trip() -> None:
@@ -123,15 +103,11 @@ def test_several_shapes_are_mixed_in_the_order_of_the_file(two_shapes: WriteStud
     ("old", "new", "key", "rule"),
     [
         ("fraction = 0.25", "fraction = 1.25", "grain.shapes.split.fraction", "less than or equal to 1"),
-        ("fraction = 0.25", 'fraction = "1 mm"', "grain.shapes.split.fraction", "without the unit"),
-        ("fraction = 0.25", "part = 0.25", "grain.shapes.split.part", "unknown key"),
         ("fraction = 0.25", "fractoin = 0.25", "grain.shapes.split.fractoin", "did you mean 'fraction'?"),
         ('clump = "split.txt"', 'clump = "none.txt"', "grain.shapes.split.clump", "no such clump file"),
-        ('clump = "split.txt"', "", "grain.shapes.split", "needs a clump"),
         ('clump = "split.txt"', 'clump = "split.txt"\nsphere = "1 mm"', "grain.shapes.split", "not both"),
         ("fraction = 0.25", "", "grain", "every shape but one needs its fraction"),
         ('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.7', "grain", "add up to 1 .*, got 0.95"),
-        ('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.8', "grain", "add up to 1 .*, got 1.05"),
     ],
 )
 def test_a_breach_in_one_of_several_shapes_is_placed_there(
@@ -164,7 +140,7 @@ high = 0.4
     assert study.limits["S"] == (0.0, 1.0)
     assert study.case({}, seed=1).grains.mixture.fractions == (0.8, 0.2)
     assert study.case({"S": 0.1}, seed=1).grains.mixture.fractions == (0.9, 0.1)
-    # Without split grains a case is one of spheres.
+    # Without split grains a case has spheres only.
     assert study.case({"S": 0.0}, seed=1).grains.sphere_count == 1
     with pytest.raises(StudyError, match="less than or equal to 1"):
         study.case({"S": 1.1}, seed=1)
@@ -191,10 +167,8 @@ measurement.fit = "middle"
 @pytest.mark.parametrize(
     ("fixed", "parameter", "low", "high"),
     [
-        ("size_sd", "grain.size_sd", 0.0, 0.1),
         ("sphere", "grain.sphere", "1 mm", "2 mm"),
         ("height", "scene.lifted-cylinder.height", "20 mm", "40 mm"),
-        ("duration", "scene.lifted-cylinder.duration", "1 s", "2 s"),
         ("modulus_scale", "numerics.modulus_scale", 10.0, 400.0),
     ],
 )
@@ -262,19 +236,15 @@ margin = "1.5 deg"
     ("old", "new", "key", "rule"),
     [
         ('sphere = "2 mm"', "sphere = 2", "grain.sphere", "unit of length"),
-        ('sphere = "2 mm"', 'sphere = "2 MPa"', "grain.sphere", "unit of length"),
         ('sphere = "2 mm"', 'sphere = "-2 mm"', "grain.sphere", "greater than 0"),
         ('sphere = "2 mm"', 'sphere = "wide"', "grain.sphere", "must be a number"),
-        ('sphere = "2 mm"', "sphere = true", "grain.sphere", "must be a number"),
         ('sphere = "2 mm"', 'clump = "none.txt"', "grain.clump", "no such clump file"),
         ('sphere = "2 mm"', "", "grain", "needs a clump"),
         ('sphere = "2 mm"', 'spere = "2 mm"', "grain.spere", "did you mean 'sphere'?"),
         ("poisson_ratio = 0.25", "poisson_ratio = 0.7", "grain.poisson_ratio", "less than or equal to 0.5"),
-        ("poisson_ratio = 0.25", "poisson_ratio = inf", "grain.poisson_ratio", "finite"),
         ('sd = "0.5 deg"\n', "", "target", "missing: sd"),
         ("low = 0.2", "low = 0.9", "factor[1]", "low must be below high"),
         ("low = 0.2", "low = -0.2", "factor[1]", "must stay within 0"),
-        ("low = 0.2", 'low = "0.2 mm"', "factor[1].low", "without the unit"),
         (
             'parameter = "contact.grain-grain.static_friction"',
             'parameter = "contact.static_friction"',
@@ -287,7 +257,6 @@ margin = "1.5 deg"
             "contact.grain-grain.static_friction",
             "varied by the factor 'E'",
         ),
-        ('mean = "30 deg"', "mean = 30", "target.mean", "unit of angle"),
         ('name = "E"', 'name = "E:F"', "factor[1].name", "pattern"),
     ],
 )
@@ -307,21 +276,15 @@ def test_a_breach_is_named_with_its_rule_value_and_line(
     assert own_line or line in ("[grain]", "[target]", "[[factor]]")
 
 
-def test_a_breach_inside_a_scale_is_placed_there(write_study: WriteStudy) -> None:
-    path = write_study(add="numerics.precision = 'half'\n")
-    assert load_study(path).numerics.precision == "mixed"
+def test_every_breach_is_listed_with_its_scale(write_study: WriteStudy) -> None:
+    path = write_study(('density = "700 kg/m^3"', "density = 700"), add="numerics.precision = 'half'\n")
     with pytest.raises(StudyError) as caught:
         load_study(path, "stiff")
     last_line = len(path.read_text(encoding="utf-8").splitlines())
-    assert caught.value.place == f"{path}:{last_line}: scale.stiff.numerics.precision"
-    assert caught.value.value == "'half'"
-
-
-def test_every_breach_is_listed(write_study: WriteStudy) -> None:
-    path = write_study(('density = "700 kg/m^3"', "density = 700"), ('sphere = "2 mm"', "sphere = 2"))
-    with pytest.raises(StudyError) as caught:
-        load_study(path)
-    assert len(caught.value.problems) == 2
+    assert [problem.place for problem in caught.value.problems] == [
+        f"{path}:6: grain.density",
+        f"{path}:{last_line}: scale.stiff.numerics.precision",
+    ]
 
 
 @pytest.mark.parametrize("key", ["name", "parameter"])
@@ -338,10 +301,8 @@ def test_no_two_factors_share_a_name_or_a_parameter(write_study: WriteStudy, key
     ("extra", "rule"),
     [
         ("[campaign.climb]\nstart = { Q = 0.3 }\nstep = { Q = 0.1 }\n", "must name a factor"),
-        ("[campaign.verification]\nmargin = 1.0\n", "unit of angle"),
         ("[campaign.screning]\nruns = 12\n", "did you mean 'screening'?"),
         ("[campaign.screening]\nruns = 13\n", "multiple of 4"),
-        ("[target.twin]\ntruth = { E = '0.3 m' }\n", "without the unit"),
         ("[surplus]\n", "unknown key"),
     ],
 )
@@ -386,10 +347,3 @@ def test_a_new_study_loads_and_never_overwrites(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="never overwrites"):
         write_template("my grain", tmp_path)
     assert path.read_text(encoding="utf-8") == "mine"
-
-
-def test_the_buckwheat_file_names_no_value_twice() -> None:
-    document = tomllib.loads(BUCKWHEAT.read_text(encoding="utf-8"))
-    parameters = {factor["parameter"] for factor in document["factor"]}
-    assert len(parameters) == 8
-    assert "contact" not in document

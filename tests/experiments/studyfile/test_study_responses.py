@@ -1,4 +1,4 @@
-"""Responses beside the angle in a study file: what they mean, and what is said about a wrong one."""
+"""Further responses of a study file: their meaning, and the errors of a wrong one."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_a_table_is_simulated_each_row_in_its_scene(
     found = run_cases(study, table, Store(tmp_path))
     # one call for all, the costly ones first
     assert simulated == [{1: LiftedCylinder, 2: Hopper, 3: LiftedCylinder}]
-    # A bin leaves no heap, and is none that failed to be measured.
+    # A bin leaves no heap, and its measurement did not fail.
     assert found["angle"].notna().tolist() == [True, False, True]
     assert found["reason"].eq("").all()
 
@@ -127,11 +127,7 @@ def test_a_table_is_simulated_each_row_in_its_scene(
         ('mean = "12 g/s"', 'mean = "12 g"', "response[2].mean", "unit of mass flow"),
         ('mean = "12 g/s"\n', "", "response[2]", "missing: mean"),
         ("sd = 0.01", "sd = 0.0", "response[1].sd", "must be positive"),
-        ("n = 4", "n = 1", "response[1].n", "greater than or equal to 2"),
-        ("mean = 0.55", "meen = 0.55", "response[1].meen", "did you mean 'mean'?"),
-        ('name = "outflow"', 'name = "out flow"', "response[2].name", "pattern"),
         ('name = "outflow"', 'name = "solid_fraction"', "response[2]", "name that no other response has"),
-        ('name = "short_angle"\n', "", "response[3]", "name that no other response has"),
         ('"solid_fraction"', '"angle"\nname = "a"', "response[1].observable", "matches this observable"),
         ('outlet = "20 mm"', 'outlet = "50 mm"', "response-scene.bin.hopper", "below the diameter"),
     ],
@@ -153,7 +149,7 @@ def test_a_further_scene_has_a_name_of_its_own(write_study: WriteStudy) -> None:
     assert caught.value.place.endswith("response-scene.target")
 
 
-@pytest.mark.parametrize("scale", [None, "paper", "bench"])
+@pytest.mark.parametrize("scale", [None, "bench"])
 def test_the_study_from_a_curve_to_a_point_hides_the_same_truth_at_every_scale(scale: str | None) -> None:
     study = load_study(BUCKWHEAT.with_name("curve_to_point.toml"), scale)
     assert [response.scene for response in study.target.responses] == ["target", "target", "bin"]
