@@ -14,11 +14,8 @@ Limits = Mapping[str, tuple[float, float]]
 def check_calibration(study: Study) -> None:
     """Check that a study has factors and a target, and that the campaign's settings fit the factors.
 
-    Raises
-    ------
-    StudyError
-        When a setting names no factor, a fixed value leaves its limits, a step or half-range is not positive,
-        or the screening design is too small.
+    Raise StudyError when a setting names no factor, a fixed value leaves its limits, a step or half-range is
+    not positive, or the screening design is too small.
     """
     if not study.factors:
         raise StudyError(str(study.file), "needs at least one [[factor]] to be calibrated")

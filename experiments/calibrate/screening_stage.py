@@ -28,10 +28,7 @@ LEAST_RUNS = 8
 def screening_design(factors: Sequence[Factor], settings: ScreeningSettings) -> Design:
     """Make the design: as many runs as asked for, or the fewest with the wanted number of dummies.
 
-    Raises
-    ------
-    ValueError
-        When no design has the name, or the design does not come in so many runs.
+    Raise ValueError when no design has the name, or the design does not come in so many runs.
     """
     if settings.design not in DESIGNS:
         raise ValueError(f"design must be one of {', '.join(DESIGNS)}, got {settings.design!r}")

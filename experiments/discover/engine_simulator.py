@@ -84,10 +84,8 @@ class EngineSimulator:
     def __call__(self, points: Sequence[Point], progress: OnProgress | None = None) -> Outcomes:
         """Return the observables of every point, in order; `progress` is called with the progress.
 
-        Raises
-        ------
-        ValueError
-            When a point names an unknown mechanism or condition, or has not one value for every factor.
+        Raise ValueError when a point names an unknown mechanism or condition, or has not one value for every
+        factor.
         """
         cases: dict[str, Case] = {}
         keys, refused = [], {}
@@ -106,24 +104,14 @@ class EngineSimulator:
         return Outcomes(values, tuple(found[key][1] for key in keys))
 
     def heaps(self, points: Sequence[Point]) -> list[CaseResult]:
-        """Simulate a few points for their heaps, of which the table keeps the observables only.
-
-        Raises
-        ------
-        StudyError, ValueError
-            As by `case`.
-        """
+        """Simulate a few points for their heaps, of which the table keeps the observables only; ."""
         return self._workers.simulate([self.case(point) for point in points], self.engine)
 
     def case(self, point: Point) -> Case:
         """Build the case of a point.
 
-        Raises
-        ------
-        StudyError
-            When the study refuses it: a value leaves what is physical, or two mechanisms exclude each other.
-        ValueError
-            When the point does not fit the study.
+        Raise StudyError when the study refuses it: a value leaves what is physical, or two mechanisms exclude
+        each other. Raise ValueError when the point does not fit the study.
         """
         if len(point.theta) != len(self._factors):
             rule = f"Point.theta: must be one value for each of {', '.join(self._factors)}"

@@ -100,13 +100,8 @@ FILES: Mapping[str, Path] = Registry(
 def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[MechanismFactor, ...]:
     """Read the mechanisms that a study may lack from files by their names, in alphabetical order.
 
-    Without those that the study cannot have: its test has no such setting, a factor varies it already, it
-    is at the maximum, or something else in the study excludes it.
-
-    Raises
-    ------
-    StudyError
-        When a file breaks a rule.
+    Without those that the study cannot have: its test has no such setting, a factor varies it already, it is
+    at the maximum, or something else in the study excludes it. Raise StudyError when a file breaks a rule.
     """
     scales = grain_scales(study.case({}, seed=0))
     found = (_mechanism(name, path, study, scales) for name, path in sorted(files.items()))
@@ -116,10 +111,8 @@ def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[Mechan
 def with_maximum(study: Study, mechanism: MechanismFactor, size: Quantity) -> MechanismFactor:
     """Give a mechanism of its `library_for` another largest size.
 
-    Raises
-    ------
-    StudyError
-        When the size is no quantity of its kind, not above its null, or more than the study can have.
+    Raise StudyError when the size is no quantity of its kind, not above its null, or more than the study can
+    have.
     """
     place = f"{study.file}: discover.maxima.{mechanism.name}"
     try:

@@ -54,11 +54,8 @@ class Search:
     def of(cls, study: Study) -> Search:
         """Read the search of a study, as its ``[discover]`` has it.
 
-        Raises
-        ------
-        StudyError
-            When the study cannot be searched: nothing varies, every condition is held out, or
-            ``[discover]`` names what it cannot have.
+        Raise StudyError when the study cannot be searched: nothing varies, every condition is held out, or
+        ``[discover]`` names what it cannot have.
         """
         file = str(study.file)
         if not study.factors:
@@ -108,10 +105,7 @@ class Search:
     def make_bank(self, simulator: Simulator, maker: Mapping[str, str] | None = None) -> Bank:
         """Simulate the points of the bank in one call; ``maker`` describes the engine of the simulator.
 
-        Raises
-        ------
-        RuleError
-            When too few of them finish for an emulator.
+        Raise RuleError when too few of them finish for an emulator.
         """
         points = bank_points(self.space, self.settings)
         outcomes = simulator(points)
@@ -120,10 +114,7 @@ class Search:
     def read_bank(self, path: Path) -> Bank:
         """Read a bank that was made for this study.
 
-        Raises
-        ------
-        InputError
-            When the file is no bank, or that of another study.
+        Raise InputError when the file is no bank, or that of another study.
         """
         bank, mine = _up_to_date(load_bank(path).renamed(FORMER_NAMES), self.space), self.space
         its = bank.space

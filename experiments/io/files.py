@@ -57,12 +57,8 @@ def replacing(path: Path) -> Iterator[Path]:
 def require_new_file(path: Path, what: str) -> None:
     """Refuse a file that exists or cannot be made; the attempt leaves nothing.
 
-    Raises
-    ------
-    InputError
-        When it is one of these; the hint names its kind, e.g. ``a picture``.
-    OSError
-        When the disk is full.
+    Raise InputError when it is one of these; the hint names its kind, e.g. ``a picture``. Raise OSError when
+    the disk is full.
     """
     # pathlib raises where a name is too long for the system
     if os.path.lexists(path):
@@ -73,12 +69,7 @@ def require_new_file(path: Path, what: str) -> None:
 def require_folder(path: Path) -> None:
     """Refuse a folder that cannot be made or written to; the attempt leaves nothing.
 
-    Raises
-    ------
-    InputError
-        When it is one of these.
-    OSError
-        When the disk is full.
+    Raise InputError when it is one of these. Raise OSError when the disk is full.
     """
     _require_place(path / "trial", path)
 
@@ -118,12 +109,8 @@ def has_temporary_name(path: Path) -> bool:
 def check_file(path: Path, largest: int) -> None:
     """Refuse a file, which may come from anyone, before it is opened.
 
-    Raises
-    ------
-    OSError
-        When there is no such file.
-    InputError
-        When it is not a regular file, e.g. a pipe, or has more than the largest number of bytes.
+    Raise OSError when there is no such file. Raise InputError when it is not a regular file, e.g. a pipe, or
+    has more than the largest number of bytes.
     """
     facts = path.stat()
     if not stat.S_ISREG(facts.st_mode):

@@ -36,10 +36,7 @@ _PROPERTIES: dict[type, tuple[str, ...]] = {
 def jsonable(value: Any) -> Any:
     """Turn a result into plain JSON data: text, finite numbers, lists, dicts; other numbers are None.
 
-    Raises
-    ------
-    TypeError
-        For a kind of value that has no plain form.
+    Raise TypeError for a kind of value that has no plain form.
     """
     match value:
         case Enum():

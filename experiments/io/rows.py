@@ -37,12 +37,8 @@ class Row:
 def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> Iterator[Row]:
     """Read the rows of a CSV file in UTF-8; empty rows, and rows that begin with ``#``, are skipped.
 
-    The first row names the columns: all that are needed, and any of the known ones.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, its columns are not these, or a row has more cells than columns.
+    The first row names the columns: all that are needed, and any of the known ones. Raise InputError when the
+    file cannot be read, its columns are not these, or a row has more cells than columns.
     """
     header: list[str] = []
     for line, cells in _lines(path):

@@ -29,10 +29,7 @@ DELIMITERS = (";", "\t", None, ",")
 def read_text(path: Path, largest: int = LARGEST) -> str:
     """Read a text file in UTF-8 of at most `largest` bytes, without its byte-order mark.
 
-    Raises
-    ------
-    InputError
-        When there is no such file, it is too large, or it is not text in UTF-8; UTF-16 is named.
+    Raise InputError when there is no such file, it is too large, or it is not text in UTF-8; UTF-16 is named.
     """
     try:
         data = read_file(path, largest)

@@ -23,13 +23,7 @@ LONGEST_SHOWN = 200
 
 
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
-    """Read a TOML file: its text and its document.
-
-    Raises
-    ------
-    StudyError
-        When it cannot be read or is not TOML.
-    """
+    """Read a TOML file: its text and its document; StudyError when it cannot be read or is not TOML."""
     try:
         text = read_text(path).replace("\r\n", "\n")
         _check_keys(text)

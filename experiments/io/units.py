@@ -49,10 +49,7 @@ class Quantity:
     def parse(cls, value: object) -> Quantity:
         """Read a number, text such as ``"110 mm"``, or a quantity.
 
-        Raises
-        ------
-        ValueError
-            When the value is neither, or the number is not finite.
+        Raise ValueError when the value is neither, or the number is not finite.
         """
         if isinstance(value, cls):
             quantity = value
@@ -106,10 +103,7 @@ def _float(value: float) -> float:
 def dimension_of_unit(unit: str) -> str:
     """Name the dimension of an SI unit, as a parameter or an observable of the engine has it.
 
-    Raises
-    ------
-    ValueError
-        When it is not an SI unit of a known dimension.
+    Raise ValueError when it is not an SI unit of a known dimension.
     """
     if unit == "1":
         return ""
@@ -122,10 +116,7 @@ def dimension_of_unit(unit: str) -> str:
 def unit_size(unit: str, dimension: str) -> float:
     """Size of a unit in the base unit of its dimension.
 
-    Raises
-    ------
-    ValueError
-        When the unit is not one of the dimension's; the message names those.
+    Raise ValueError when the unit is not one of the dimension's; the message names those.
     """
     if not dimension and unit:
         raise ValueError(f"must be a plain number without the unit {unit!r}")

@@ -31,13 +31,9 @@ SECTIONS = ("grain", "wall", "contact", "mechanism", "solver")
 def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Lay a study document over the card that it names, relative to a folder, if it names one.
 
-    The laws of the card hold where the study does not name any.
-
-    Raises
-    ------
-    StudyError
-        When there is no such card, the file is not a card, or its values were found with other laws than the
-        study's and the study does not say so.
+    The laws of the card hold where the study does not name any. Raise StudyError when there is no such card,
+    the file is not a card, or its values were found with other laws than the study's and the study does not
+    say so.
     """
     own = {key: value for key, value in document.items() if key != MATERIAL}
     if MATERIAL not in document:
@@ -55,10 +51,7 @@ def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 def check_laws(document: Mapping[str, Any], sections: Mapping[str, Any], path: Path) -> None:
     """Check that a study has the laws of its card, or says which others the card has, ``solver.card_laws``.
 
-    Raises
-    ------
-    StudyError
-        When it has others and does not say so.
+    Raise StudyError when it has others and does not say so.
     """
     solver = document.get("solver", {})
     if not isinstance(solver, Mapping) or LAWS not in solver:
@@ -76,10 +69,7 @@ def check_laws(document: Mapping[str, Any], sections: Mapping[str, Any], path: P
 def read_card(path: Path) -> dict[str, Any]:
     """Read the sections of a card, its clump files by their whole path, and the solver of its bridge.
 
-    Raises
-    ------
-    StudyError
-        When the file cannot be read, or is no card.
+    Raise StudyError when the file cannot be read, or is no card.
     """
     _, card = read_toml(path)
     sections = card.get(MATERIAL)
@@ -106,10 +96,7 @@ def is_card(path: Path) -> bool:
 def card_document(card: Mapping[str, Any], path: Path) -> dict[str, Any]:
     """Lay out the study of a card's own test, from what the card at a path says.
 
-    Raises
-    ------
-    StudyError
-        When it is no card, or does not say which test it was fitted to.
+    Raise StudyError when it is no card, or does not say which test it was fitted to.
     """
     fitted = card.get("fitted", {})
     if not isinstance(fitted, Mapping) or "test" not in fitted:

@@ -74,10 +74,7 @@ class Profile(Section):
 def read_profile(path: Path) -> ClusterSection:
     """Read a profile: a TOML file whose one section is ``[cluster]``.
 
-    Raises
-    ------
-    StudyError
-        When it cannot be read or breaks a rule.
+    Raise StudyError when it cannot be read or breaks a rule.
     """
     text, document = read_toml(path)
     return validated(Profile, document, Places.read(path, text)).cluster

@@ -93,20 +93,14 @@ class FactorSection(Section):
     def natural(self, value: object) -> float:
         """Read a quantity (``"34 MPa"``, 0.46) as a number in the natural unit.
 
-        Raises
-        ------
-        ValueError
-            When it is no quantity of the factor's dimension.
+        Raise ValueError when it is no quantity of the factor's dimension.
         """
         return self.dimension.to_unit(value, self.unit)
 
     def write(self, changes: dict[str, Any], value: float, places: Places) -> None:
         """Add a value in the natural unit, at each of its places, to the changes of a study's physics.
 
-        Raises
-        ------
-        StudyError
-            When the value leaves what is physical.
+        Raise StudyError when the value leaves what is physical.
         """
         for setter in self.setters:
             try:
@@ -149,10 +143,7 @@ class FactorTable(Section):
 def natural_value(sections: Iterable[FactorSection], name: str, value: object) -> float:
     """Read the value of a factor with its unit as a number in its natural unit.
 
-    Raises
-    ------
-    ValueError
-        When there is no such factor, or the value is no quantity of its dimension.
+    Raise ValueError when there is no such factor, or the value is no quantity of its dimension.
     """
     by_name = {section.name: section for section in sections}
     if name not in by_name:

@@ -37,13 +37,7 @@ class EngineSection(Section):
         return self
 
     def build(self, **beside: Any) -> Any:
-        """Build the object.
-
-        Raises
-        ------
-        ValueError
-            When it breaks a rule of the engine.
-        """
+        """Build the object; ValueError when it breaks a rule of the engine."""
         return self.engine(**beside, **dict(self))
 
 

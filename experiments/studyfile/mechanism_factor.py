@@ -52,12 +52,8 @@ def with_mechanisms(
 ) -> Study:
     """Add mechanisms of the study's library to it, each as one more factor.
 
-    A mechanism without a range of its own in ``ranges`` goes from its null to its maximum.
-
-    Raises
-    ------
-    StudyError
-        When the study cannot have one, or two of them exclude each other.
+    A mechanism without a range of its own in ``ranges`` goes from its null to its maximum. Raise StudyError
+    when the study cannot have one, or two of them exclude each other.
     """
     chosen = {one.name: (one.null, one.maximum) for one in mechanisms} | dict(ranges or {})
     tables = [one.table(*chosen[one.name]) for one in mechanisms]

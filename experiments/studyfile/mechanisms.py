@@ -19,10 +19,7 @@ class MechanismsSection(LibrarySection):
     def mechanisms(self) -> tuple[Mechanism, ...]:
         """Build the engine's mechanisms: those that the study names.
 
-        Raises
-        ------
-        ValueError
-            When a parameter leaves what is physical, or two of them exclude each other.
+        Raise ValueError when a parameter leaves what is physical, or two of them exclude each other.
         """
         built = tuple(section.build() for section in self.given.values())
         for kind in ("grains", "walls"):

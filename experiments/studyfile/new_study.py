@@ -13,10 +13,7 @@ TEMPLATE = Path(__file__).parents[1] / "studies" / "template.toml"
 def write_template(name: str, folder: Path | None = None) -> Path:
     """Write a commented study file for a grain, ``NAME.toml`` in a folder or in the current one.
 
-    Raises
-    ------
-    InputError
-        When the name has other characters, or the file exists.
+    Raise InputError when the name has other characters, or the file exists.
     """
     path = new_study_path(name, folder)
     text = TEMPLATE.read_text(encoding="utf-8").replace("{name}", path.stem).replace("{file}", path.name)

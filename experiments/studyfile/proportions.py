@@ -29,10 +29,7 @@ def widths(diameter: float, shape: ClumpShape | ShapeMixture, size: float) -> fl
 def narrowness(diameter: float | None, shape: ClumpShape | ShapeMixture, size: float) -> str:
     """Say that a container is narrow; empty where it is not, and where it has no diameter.
 
-    Raises
-    ------
-    ValueError
-        When grains cannot pass one another in it.
+    Raise ValueError when grains cannot pass one another in it.
     """
     if diameter is None:
         return ""

@@ -38,10 +38,7 @@ def check_factor_names(
 ) -> None:
     """Refuse factors whose name a table has for something else, be it of these scenes and responses.
 
-    Raises
-    ------
-    StudyError
-        With every such factor, and its place.
+    Raise StudyError with every such factor, and its place.
     """
     measured = {name for scene in scenes for name in observables_of(scene.observables, scene.leaves_a_heap)}
     taken = RESERVED | measured | set(responses)

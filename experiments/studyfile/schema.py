@@ -40,23 +40,14 @@ class Dimension:
     """Unit of a number that is written without one; ``""``: a number needs its unit."""
 
     def to_base(self, value: object) -> float:
-        """Read a quantity and convert it.
-
-        Raises
-        ------
-        ValueError
-            When it is no quantity of the dimension.
-        """
+        """Read a quantity and convert it; ValueError when it is no quantity of the dimension."""
         quantity = Quantity.parse(value)
         return Quantity(quantity.number, quantity.unit or self.plain).to_base(self.name)
 
     def to_unit(self, value: object, unit: str) -> float:
         """Read a quantity and express it in a unit of the dimension.
 
-        Raises
-        ------
-        ValueError
-            When it is no quantity of the dimension.
+        Raise ValueError when it is no quantity of the dimension.
         """
         quantity = Quantity.parse(value)
         return quantity.number if quantity.unit == unit else self.to_base(quantity) / self.size(unit)
@@ -188,12 +179,8 @@ def validated(
 ) -> SectionT:
     """Validate the values of a section by key, which is at a key path of the file.
 
-    Validators take the further facts of ``context``.
-
-    Raises
-    ------
-    StudyError
-        With every rule that is broken, the value received and its place.
+    Validators take the further facts of ``context``. Raise StudyError with every rule that is broken, the
+    value received and its place.
     """
     try:
         return model.model_validate(document, context={"folder": places.folder, **context})

@@ -45,10 +45,7 @@ class Setter:
     def write(self, changes: dict[str, Any], quantity: Quantity) -> None:
         """Add a quantity at this place to the changes of a study's physics.
 
-        Raises
-        ------
-        ValueError
-            When it leaves the bounds.
+        Raise ValueError when it leaves the bounds.
         """
         try:
             value = self.number.validate_python(quantity)
@@ -63,10 +60,7 @@ class Setter:
 def setter_at(parameter: str) -> Setter:
     """Compile the setter of a place, as ``contact.grain-grain.static_friction``.
 
-    Raises
-    ------
-    ValueError
-        When there is no quantity.
+    Raise ValueError when there is no quantity.
     """
     # A place may lead elsewhere once a library has grown; laws are loaded for a place in one of them alone.
     laws = (mechanisms_section(),) if parameter.startswith("mechanism.") else ()
@@ -103,10 +97,7 @@ def changed(value: Any, change: Any) -> Any:
 def revised(section: SectionT, change: Mapping[str, Any]) -> SectionT:
     """Copy a section with values by key, nested as in a file; a section that is missing is made of them.
 
-    Raises
-    ------
-    ValueError
-        When there is no such key, or a value or the whole section breaks a rule.
+    Raise ValueError when there is no such key, or a value or the whole section breaks a rule.
     """
     known, update = fields_of(type(section)), {}
     for key, value in change.items():

@@ -42,10 +42,7 @@ class LawsSection(EngineSection):
     def laws(self) -> ContactLaws:
         """Build the engine's laws.
 
-        Raises
-        ------
-        ValueError
-            When there is no set of the name, or the choices do not go together.
+        Raise ValueError when there is no set of the name, or the choices do not go together.
         """
         own = {name: getattr(self, name) for name in self.model_fields_set if name != BASE}
         return replace(_named(self.base), **own)
@@ -95,10 +92,7 @@ class SolverSection(Section):
     def check_solver(self, name: str, place: str) -> None:
         """Check that values corrected for one solver run in it, or that the study says which one it was.
 
-        Raises
-        ------
-        StudyError
-            When the solver of this name is another one, and the study does not say so.
+        Raise StudyError when the solver of this name is another one, and the study does not say so.
         """
         if self.corrected_for in (None, name, self.card_solver):
             return
@@ -109,13 +103,7 @@ class SolverSection(Section):
 
 
 def laws_of(solver: Mapping[str, Any]) -> ContactLaws:
-    """Laws that a ``[solver]`` names.
-
-    Raises
-    ------
-    pydantic.ValidationError
-        When they break a rule.
-    """
+    """Laws that a ``[solver]`` names; ."""
     return SolverSection.model_validate(solver).laws  # type: ignore[no-any-return]
 
 

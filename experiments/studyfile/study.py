@@ -130,10 +130,8 @@ class Study(Physics):
     def target(self) -> Target:
         """Responses that the cases must match.
 
-        Raises
-        ------
-        StudyError
-            When the study has none, they are still to be measured, or its test leaves no heap to match.
+        Raise StudyError when the study has none, they are still to be measured, or its test leaves no heap to
+        match.
         """
         if self.target_section is not None and self.target_section.lacks_a_heap(self.scenes):
             problem = "needs an observable: this test leaves no heap whose angle could be the target"
@@ -179,10 +177,7 @@ class Study(Physics):
     def under(self, condition: str) -> Study:
         """Study of the test under one condition; it takes settings of all factors of this one.
 
-        Raises
-        ------
-        StudyError
-            When there is no such condition.
+        Raise StudyError when there is no such condition.
         """
         known = {each.name: each for each in self.conditions}
         if condition not in known:
@@ -201,10 +196,7 @@ class Study(Physics):
     def with_engine(self, engine: Mapping[str, Any]) -> Study:
         """Return the same study, whose cases another engine simulates: an ``[engine]`` as written.
 
-        Raises
-        ------
-        StudyError
-            When the section breaks a rule.
+        Raise StudyError when the section breaks a rule.
         """
         section = validated(EngineSection, engine, self._places, ("engine",))
         return self._changed(self.document | {"engine": dict(engine)}, engine=section)
@@ -217,10 +209,8 @@ class Study(Physics):
     ) -> Study:
         """Return the same study, whose cases must match other numbers, read in another way where it says so.
 
-        Raises
-        ------
-        StudyError
-            When two have one name, there is no such scene or observable, or a measurement is wrong.
+        Raise StudyError when two have one name, there is no such scene or observable, or a measurement is
+        wrong.
         """
         sections, reading = tuple(responses), measurement or self.measurement
         document = {key: value for key, value in self.document.items() if key not in ("target", "response")}
@@ -322,10 +312,7 @@ class Study(Physics):
     def natural_settings(self, settings: Mapping[str, object], source: str = "settings") -> dict[str, float]:
         """Read factor values with their units, as ``{"B": "34 MPa", "E": 0.46}``, in natural units.
 
-        Raises
-        ------
-        StudyError
-            When there is no such factor, or a value is no quantity of its dimension.
+        Raise StudyError when there is no such factor, or a value is no quantity of its dimension.
         """
         natural = {}
         for name, value in settings.items():
@@ -339,11 +326,7 @@ class Study(Physics):
         """Build one case of a scene or a condition; its seed is that of everything random.
 
         Settings are values by factor name in natural units; a factor that is not named is at its middle.
-
-        Raises
-        ------
-        StudyError
-            When there is no such factor or scene, or a value leaves what is physical.
+        Raise StudyError when there is no such factor or scene, or a value leaves what is physical.
         """
         if scene in self.condition_sections:
             return self.under(scene).case(settings, seed)

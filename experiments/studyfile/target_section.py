@@ -111,11 +111,7 @@ class ResponseSection(Section):
         """Build the response of the campaign; ``unit`` is that of its observable.
 
         Where it is not ``measured``, a twin study simulates it, or its measurements are still to be taken.
-
-        Raises
-        ------
-        StudyError
-            When a measurement is missing, or is no quantity of the observable's dimension.
+        Raise StudyError when a measurement is missing, or is no quantity of the observable's dimension.
         """
         values = {name: self._value(name, unit, path, places) for name in ("mean", "sd")}
         sample = None
@@ -195,12 +191,8 @@ def build_target(
     """Build the responses that a campaign must match, in scenes some of which are held out of any fit.
 
     None where nothing is to be matched, its measurements have not been taken yet, or it is the angle of a
-    heap that the test does not leave: such a study simulates, and cannot be calibrated.
-
-    Raises
-    ------
-    StudyError
-        When two have one name, there is no such scene or observable, or a measurement is wrong.
+    heap that the test does not leave: such a study simulates, and cannot be calibrated. Raise StudyError when
+    two have one name, there is no such scene or observable, or a measurement is wrong.
     """
     if target and target.lacks_a_heap(scenes):
         return None

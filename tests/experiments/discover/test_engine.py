@@ -1,4 +1,4 @@
-"""The engine as a simulator: what it answers, keeps and refuses."""
+"""The engine as a simulator: its answers, what it keeps, and points that it refuses."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ POINTS = [
 
 
 class Scripted:
-    """Stands in for the simulator: cases end, or the machine fails, as it is told."""
+    """Stands in for the simulator: cases end, or the machine fails, as scripted."""
 
     def __init__(self, endings: Sequence[CaseResult | Exception]) -> None:
         self.endings = endings
@@ -157,19 +157,14 @@ def test_what_the_study_refuses_is_an_outcome_with_its_reason(study: Study, tabl
     assert len(table) == 0
 
 
-@pytest.mark.parametrize(
-    ("point", "rule"),
-    [
+def test_a_point_of_another_study_is_an_error(study: Study, table: OutcomeTable) -> None:
+    for point, rule in (
         (Point((0.3,), (), "wid", 1), "Point.condition: must be one of base, wide"),
         (Point((0.3,), (("glue", 1.0),), "base", 1), "Point.sizes: must name mechanisms of the library"),
         (Point((0.3, 0.4), (), "base", 1), "Point.theta: must be one value for each of E"),
-    ],
-)
-def test_a_point_of_another_study_is_an_error(
-    study: Study, table: OutcomeTable, point: Point, rule: str
-) -> None:
-    with pytest.raises(ValueError, match=rule):
-        build(study, table)([point])
+    ):
+        with pytest.raises(ValueError, match=rule):
+            build(study, table)([point])
 
 
 def test_everything_that_determines_an_outcome_is_in_its_key(

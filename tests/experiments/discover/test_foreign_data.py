@@ -33,7 +33,7 @@ from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import gather
-from doe.discrepancy.fitting.model_fit import fit, weigh
+from doe.discrepancy.fitting.model_fit import Fitted, fit, weigh
 from doe.discrepancy.fitting.size_interval import coded_size_interval
 from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
 from doe.discrepancy.verdict.records import calibration_uses
@@ -45,7 +45,7 @@ from experiments.studyfile.observables import BY_NAME
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial" / "study.toml"
 SYSTEMATIC = 0.2
-"""As in the trial study at this scale."""
+"""Systematic error of the trial study at this scale."""
 REPLICATES = 8
 
 
@@ -76,7 +76,7 @@ def heaps(coded: Mapping[str, float], seed: int) -> Measured:
 
 
 def with_reading_errors(measured: Measured, deviations: float, seed: int) -> Measured:
-    """Add to each value by itself so many standard deviations of one run."""
+    """Add a number of standard deviations of one run to each value."""
     rng = np.random.default_rng([seed, 8])
     values = {}
     for condition, rows in measured.values.items():
@@ -85,8 +85,15 @@ def with_reading_errors(measured: Measured, deviations: float, seed: int) -> Mea
     return Measured(measured.conditions, measured.observables, values)
 
 
+def fitted(measured: Measured, *mechanisms: str) -> Fitted:
+    """Fit the base with these mechanisms to the training conditions."""
+    evidence = gather(measured, known())
+    model = Model(known(), mechanisms, SYSTEMATIC, views=evidence.views)
+    return fit(Stack(model, evidence.training))
+
+
 def base_p(measured: Measured) -> float:
-    """P value of the gap of the calibrated base, as an analysis begins with it."""
+    """Return the p value of the gap of the calibrated base, with which an analysis begins."""
     evidence = gather(measured, known())
     base = fit(Stack(Model(known(), (), SYSTEMATIC), evidence.training))
     whole = weigh(Stack(base.model, (*evidence.training, *evidence.held_out)), base.x)
@@ -100,7 +107,7 @@ def test_errors_of_reading_raise_no_alarm() -> None:
     assert alarms <= stats.binom.isf(1e-3, len(data), 0.025)
 
 
-def test_what_heaps_scatter_together_is_told_from_what_is_read_by_itself() -> None:
+def test_scatter_of_heaps_is_separated_from_errors_of_reading() -> None:
     found = []
     for seed in range(6):
         quiet = heaps({}, seed)
@@ -138,37 +145,32 @@ def test_scatter_that_an_effect_widens_is_charged_once() -> None:
 def test_a_fit_ends_no_higher_than_the_truth_or_any_other_place() -> None:
     hidden = {"plate_tilt": 0.39, "rolling_torque": 0.77}
     names = tuple(sorted(hidden))
-    for seed in range(2):
-        evidence = gather(heaps(hidden, seed), known())
-        for mechanisms in (names, names[:1]):
-            stack = Stack(Model(known(), mechanisms, SYSTEMATIC), evidence.training)
-            low, high = stack.model.lower, stack.model.upper
-            places = list(low + sobol_points(64, len(low), 3) * (high - low))
-            places.append(np.append(theta(seed), [hidden[name] for name in mechanisms]))
-            # The descent ends where a step brings 0.01 or less.
-            assert fit(stack).score <= min(weigh(stack, x).score for x in places) + 0.01
+    evidence = gather(heaps(hidden, 0), known())
+    for mechanisms in (names, names[:1]):
+        stack = Stack(Model(known(), mechanisms, SYSTEMATIC), evidence.training)
+        low, high = stack.model.lower, stack.model.upper
+        places = list(low + sobol_points(64, len(low), 3) * (high - low))
+        places.append(np.append(theta(0), [hidden[name] for name in mechanisms]))
+        # The descent ends where a step brings 0.01 or less.
+        assert fit(stack).score <= min(weigh(stack, x).score for x in places) + 0.01
 
 
 def test_a_tilt_is_found_where_the_middle_of_the_ranges_leads_to_none() -> None:
     hidden = {"plate_tilt": 0.5, "vibration": 0.9}
     # Two optima: down the score from the middle the tilt ends at 0, some 7 above the least.
-    evidence = gather(heaps(hidden, 2), known())
-    stack = Stack(Model(known(), tuple(sorted(hidden)), SYSTEMATIC), evidence.training)
-    fitted, truth = fit(stack), np.append(theta(2), [hidden[name] for name in sorted(hidden)])
-    assert fitted.score <= weigh(stack, truth).score
-    tilt = fitted.mechanisms.index("plate_tilt")
-    assert abs(fitted.coded_sizes[tilt] - hidden["plate_tilt"]) < 3.0 * fitted.coded_size_errors[tilt]
-    assert fitted.coded_sizes[tilt] > 0.3
+    found = fitted(heaps(hidden, 2), *sorted(hidden))
+    tilt = found.mechanisms.index("plate_tilt")
+    assert abs(found.coded_sizes[tilt] - hidden["plate_tilt"]) < 3.0 * found.coded_size_errors[tilt]
+    assert found.coded_sizes[tilt] > 0.3
 
 
 def test_an_interval_holds_its_size_even_where_nothing_fits() -> None:
     # The score of a gross misfit asks for large sizes, whose predictions are uncertain; q for small ones.
     measured = shifted(heaps({"rolling_torque": 1.0}, 1), "height", 0.01)
-    evidence = gather(measured, known())
     for name in known().space.names:
-        fitted = fit(Stack(Model(known(), (name,), SYSTEMATIC), evidence.training))
-        low, high = coded_size_interval(fitted, 0)
-        assert low <= fitted.coded_sizes[0] <= high
+        found = fitted(measured, name)
+        low, high = coded_size_interval(found, 0)
+        assert low <= found.coded_sizes[0] <= high
 
 
 def shifted(measured: Measured, observable: str, offset: float) -> Measured:
@@ -177,7 +179,7 @@ def shifted(measured: Measured, observable: str, offset: float) -> Measured:
     return replace(measured, values={name: rows + moved for name, rows in measured.values.items()})
 
 
-def test_what_is_off_alike_everywhere_is_allowed_where_the_file_states_it() -> None:
+def test_a_common_error_is_allowed_where_the_file_states_it() -> None:
     late = 0.03  # a clock; 3 to 5 standard deviations of one run, which the factors take up in part
     alarms = {False: 0, True: 0}
     for seed in range(6):
@@ -199,8 +201,7 @@ def test_a_calibration_error_hides_no_effect_that_looks_otherwise() -> None:
 def test_the_record_says_how_much_of_an_allowance_a_model_uses() -> None:
     late = 0.02
     measured = replace(shifted(heaps({}, 1), "t55", late), calibration={"t55": Calibration(late)})
-    evidence = gather(measured, known())
-    [used] = calibration_uses(fit(Stack(Model(known(), (), SYSTEMATIC), evidence.training)), evidence)
+    [used] = calibration_uses(fitted(measured), gather(measured, known()))
     assert (used.observable, used.offset, used.scale) == ("t55", late, 0.0)
     # Its error is that of five means of eight, of 11 ms a run, and what the prior draws: some 2 ms and 1.
     assert used.used_offset == pytest.approx(late, abs=3 * 0.003)
@@ -223,9 +224,8 @@ def test_lengths_of_one_instrument_are_off_by_one_scale() -> None:
         for instrument in ("pictures", ""):
             scale = Calibration(scale=share, instrument=instrument)
             measured = replace(whole, values=values, calibration=dict.fromkeys(lengths, scale))
-            evidence = gather(measured, known())
-            fitted = fit(Stack(Model(known(), (), SYSTEMATIC), evidence.training))
-            used[several, instrument] = [one.used_scale for one in calibration_uses(fitted, evidence)]
+            uses = calibration_uses(fitted(measured), gather(measured, known()))
+            used[several, instrument] = [one.used_scale for one in uses]
     of_all, of_one = used[True, "pictures"], used[False, "pictures"]
     assert of_all == pytest.approx([of_all[0]] * len(lengths))
     # the factors take up a part of it
@@ -239,10 +239,11 @@ def test_a_forecast_takes_over_what_the_fit_shows_to_be_off() -> None:
     measured = shifted(heaps({}, 2), "t55", 0.03)
     missed = []
     for calibration in ({}, {"t55": Calibration(0.03)}):
-        evidence = gather(replace(measured, calibration=calibration), known())
-        told = forecast(fit(Stack(Model(known(), (), SYSTEMATIC), evidence.training)), evidence.held_out)
-        column = list(evidence.held_out[0].columns).index(known().observables.index("t55"))
-        missed.append(abs(told.measured - told.predicted)[column])
+        stated = replace(measured, calibration=calibration)
+        held_out = gather(stated, known()).held_out
+        found = forecast(fitted(stated), held_out)
+        column = list(held_out[0].columns).index(known().observables.index("t55"))
+        missed.append(abs(found.measured - found.predicted)[column])
     assert missed[1] < 0.01 < missed[0]
 
 
@@ -274,7 +275,7 @@ def test_without_a_tilt_every_lean_is_noise() -> None:
 
 
 def seen_from(measured: Measured, cosine: float) -> Measured:
-    """Heaps as a camera elsewhere sees them: their mean leans by the cosine of the azimuth."""
+    """Return heaps seen by a camera elsewhere: their mean leans by the cosine of the azimuth."""
     lean = measured.observables.index("asymmetry")
     values = {name: rows.copy() for name, rows in measured.values.items()}
     for name, rows in values.items():
@@ -286,30 +287,24 @@ def seen_from(measured: Measured, cosine: float) -> Measured:
 @pytest.mark.parametrize("cosine", [1.0, -1.0])
 def test_a_tilt_is_fitted_alike_from_both_sides(cosine: float) -> None:
     for seed in range(2):
-        evidence = gather(seen_from(heaps({"plate_tilt": 0.7}, seed), cosine), known())
-        fitted = fit(Stack(Model(known(), ("plate_tilt",), SYSTEMATIC), evidence.training))
-        assert fitted.model.heading == (0.0 if cosine > 0.0 else 180.0)
+        found = fitted(seen_from(heaps({"plate_tilt": 0.7}, seed), cosine), "plate_tilt")
+        assert found.model.heading == (0.0 if cosine > 0.0 else 180.0)
         # 90 % of two by two intervals: all within 3.5 standard errors but for one in 400 cases.
-        assert abs(fitted.coded_sizes[0] - 0.7) < 3.5 * fitted.coded_size_errors[0]
+        assert abs(found.coded_sizes[0] - 0.7) < 3.5 * found.coded_size_errors[0]
 
 
 def test_a_tilt_along_the_line_of_sight_is_fitted_though_nothing_leans() -> None:
-    evidence = gather(seen_from(heaps({"plate_tilt": 1.0}, 1), 0.0), known())
-    fitted = fit(Stack(Model(known(), ("plate_tilt",), SYSTEMATIC), evidence.training))
+    found = fitted(seen_from(heaps({"plate_tilt": 1.0}, 1), 0.0), "plate_tilt")
     # Azimuths are tried in steps of 30 degrees.
-    assert abs(np.cos(np.radians(fitted.model.heading))) < 0.51
-    assert fitted.ratios[0] > 3.0
+    assert abs(np.cos(np.radians(found.model.heading))) < 0.51
+    assert found.ratios[0] > 3.0
 
 
 def test_conditions_seen_from_different_sides_are_one_tilt() -> None:
     whole = heaps({"plate_tilt": 0.7}, 2)
     behind = seen_from(whole, -1.0)
     mixed = replace(whole, values={**whole.values, "fast": behind.values["fast"]}, views={"fast": 180.0})
-    scores = []
-    for measured in (whole, mixed):
-        evidence = gather(measured, known())
-        model = Model(known(), ("plate_tilt",), SYSTEMATIC, views=evidence.views)
-        scores.append(fit(Stack(model, evidence.training)).score)
+    scores = [fitted(measured, "plate_tilt").score for measured in (whole, mixed)]
     # The same numbers with other signs: two descents end within a last step of each other.
     assert scores[1] == pytest.approx(scores[0], abs=0.01)
 

@@ -1,4 +1,4 @@
-"""The library of mechanisms: what each is, and what a study is with it."""
+"""The library of mechanisms, each alone and in a study."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_a_mechanism_at_its_null_is_the_study_and_at_its_maximum_is_not(trial: S
         assert full != null
 
 
-def test_each_file_says_in_words_what_it_is() -> None:
+def test_each_file_describes_its_effect_in_words() -> None:
     for mechanism in library_for(load_study(TRIAL)):
         assert re.fullmatch(r"[A-Z].*\.", mechanism.sentence, re.DOTALL), mechanism.name
         assert re.fullmatch(r"[A-Z].*\.", mechanism.confirm, re.DOTALL), mechanism.name

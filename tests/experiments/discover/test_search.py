@@ -1,4 +1,4 @@
-"""The settlement of a search before the data are opened, and the banks that it may use."""
+"""Settings of a search before the data are opened, and the banks that it may use."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Linear:
             name: 8.0 * rng.standard_normal(width) + 3.0 * rng.standard_normal((conditions, width))
             for name in self.space.names
         }
-        # what a mirror turns over is 0, but for what has a direction
+        # a value that a mirror turns over is 0, except of an effect with a direction
         self._even = ~np.isin(NAMES, self.space.odd)
         self._slopes *= self._even
         for name in self.space.names:
@@ -69,7 +69,7 @@ def bank(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_study_says_what_is_looked_for_and_how_hard() -> None:
+def test_the_study_names_the_effects_and_the_settings() -> None:
     search = Search.of(trial())
     assert [one.name for one in search.library] == sorted(search.study.discover.mechanisms or ())
     assert search.settings.bank_points == search.study.discover.settings["bank_points"]
@@ -83,10 +83,7 @@ def test_the_study_says_what_is_looked_for_and_how_hard() -> None:
         ({"mechanisms": ["plate_tilted"]}, "plate_tilt"),
         ({"settings": {"bank_point": 30}}, "bank_points"),
         ({"settings": {"bank_points": 3}}, "at least 10"),
-        ({"mechanism": ["plate_tilt"]}, "mechanisms"),
-        ({"maxima": {"plate_tilted": "8 deg"}}, "plate_tilt"),
         ({"maxima": {"plate_tilt": "8 mm"}}, "unit of angle"),
-        ({"maxima": {"plate_tilt": 8.0}}, "unit of angle"),
         ({"maxima": {"plate_tilt": "0 deg"}}, "above 0, where it has no effect"),
         ({"maxima": {"plate_tilt": "95 deg"}}, "a size that the study can have"),
     ],
@@ -130,7 +127,6 @@ def test_a_bank_comes_back_as_it_was_made(bank: Path) -> None:
     [
         {"grain": {"density": "800 kg/m^3"}},
         {"condition": {"fast": {"scene": {"lifted-cylinder": {"lift_speed": "0.3 m/s"}}}}},
-        {"scene": {"lifted-cylinder": {"grain_count": 120}}},
     ],
 )
 def test_the_bank_of_another_grain_test_or_condition_is_refused(bank: Path, changes: dict) -> None:
@@ -176,28 +172,21 @@ def test_an_older_study_and_its_bank_may_call_a_mechanism_as_it_was(tmp_path: Pa
     assert Search.of(trial(discover={"mechanisms": names})).space == search.space
 
 
-@pytest.mark.parametrize(
-    ("maker", "said"),
-    [
-        (maker_of_today("abc"), []),
-        ({}, ["the bank does not say which engine made it"]),
-        (
-            {"engine": "0" * 64, "day": "2026-03-14", "commit": "abc"},
-            ["the bank was made on 2026-03-14 by another engine (commit abc) than the fresh runs"],
-        ),
-    ],
-)
-def test_the_report_says_when_another_engine_made_the_bank(
-    maker: dict[str, str], said: list[str], tmp_path: Path
-) -> None:
+def test_the_report_says_when_another_engine_made_the_bank(tmp_path: Path) -> None:
     search = Search.of(trial())
-    world = Linear(search)
-    search.make_bank(world, maker).save(tmp_path / "bank.npz")
-    bank = search.read_bank(tmp_path / "bank.npz")
+    world, path = Linear(search), tmp_path / "bank.npz"
+    maker = {"engine": "0" * 64, "day": "2026-03-14", "commit": "abc"}
+    search.make_bank(world, maker).save(path)
+    bank = search.read_bank(path)
     assert bank.maker == maker
     measured = Measured(("base",), ("flank_angle",), {"base": np.array([[1.0], [1.1], [0.9]])})
-    notes = drive(search.analysis(measured, bank, seed=1), world).notes
-    assert [note for note in notes if "engine" in note] == said
+    for made, said in (
+        (maker_of_today("abc"), []),
+        ({}, ["the bank does not say which engine made it"]),
+        (maker, ["the bank was made on 2026-03-14 by another engine (commit abc) than the fresh runs"]),
+    ):
+        notes = drive(search.analysis(measured, replace(bank, maker=made), seed=1), world).notes
+        assert [note for note in notes if "engine" in note] == said
 
 
 def test_the_shipped_bank_knows_what_made_it() -> None:
@@ -224,15 +213,8 @@ def test_a_bank_from_before_an_effect_saturated_is_read_with_the_same_sizes(tmp_
     assert np.array_equal(read.coded_size[~rows], before.coded_size[~rows])
 
 
-def test_no_bank_at_all_is_said_so(tmp_path: Path) -> None:
-    path = tmp_path / "bank.npz"
-    path.write_bytes(b"no archive")
-    with pytest.raises(RuleError, match="bank"):
-        Search.of(trial()).read_bank(path)
-
-
 @pytest.mark.parametrize("hidden", [(), (("plate_tilt", 3.0),)])
-def test_the_page_tells_what_was_hidden_in_a_known_world(
+def test_the_page_names_what_was_hidden_in_a_known_world(
     hidden: tuple[tuple[str, float], ...], tmp_path: Path
 ) -> None:
     search = Search.of(trial())
