@@ -35,7 +35,7 @@ class Outcome(StrEnum):
     """
 
     CALIBRATED = "calibrated"
-    NOT_TOLD_APART = "not-told-apart"
+    UNDECIDED = "undecided"
     MISSED = "missed"
     NO_SIGNIFICANT_FACTOR = "no-significant-factor"
     TARGET_NOT_REACHED = "target-not-reached"
@@ -139,7 +139,7 @@ class ScreeningResult(_ByResponse[Screened]):
 
     cases: pd.DataFrame
     design: Design
-    """As planned."""
+    """Design as planned."""
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -163,7 +163,7 @@ class SelectionResult(StageResult):
     kept: tuple[str, ...]
     """Names, in the study's order (``table`` ranks them)."""
     table: pd.DataFrame
-    """By factor, strongest first: effect on the leading response, its p, percent, rank, visible (larger than
+    """Factors, strongest first: effect on the leading response, its p, percent, rank, visible (larger than
     noise alone explains), p_NAME of every further response, kept, reason."""
     visible_effect: float
     """Smallest effect on the leading response that the design could see, at the power of the settings."""
@@ -181,7 +181,7 @@ class ClimbResult(StageResult):
     cases: pd.DataFrame
     kept: tuple[str, ...]
     path: pd.DataFrame
-    """By step (index ``step``; 1 is the start, an extension below it counts 0, -1, ...): value of every kept
+    """Steps (index ``step``; 1 is the start, an extension below it counts 0, -1, ...): value of every kept
     factor, predicted (by the screening), mean (measured), sd, n (cases measured), error (mean less target),
     error_percent; NaN where all cases of a step failed."""
     step: dict[str, float]
@@ -223,7 +223,7 @@ class SurfaceResult(_ByResponse[FittedResponse]):
 
     cases: pd.DataFrame
     design: Design
-    """As planned."""
+    """Design as planned."""
     center: dict[str, float]
     half_range: dict[str, float]
     outside: pd.DataFrame

@@ -26,10 +26,7 @@ LEAST_RUNS = 8
 
 
 def screening_design(factors: Sequence[Factor], settings: ScreeningSettings) -> Design:
-    """Make the design: as many runs as asked for, or the fewest with the wanted number of dummies.
-
-    Raise ValueError when no design has the name, or the design does not come in so many runs.
-    """
+    """Make the design: as many runs as asked for, or the fewest with the wanted number of dummies."""
     if settings.design not in DESIGNS:
         raise ValueError(f"design must be one of {', '.join(DESIGNS)}, got {settings.design!r}")
     fewest = max(LEAST_RUNS, 4 * -(-(len(factors) + settings.dummies + 1) // 4))

@@ -166,4 +166,4 @@ def _verdict(study: Study, optimum: OptimumResult, verification: VerificationRes
     if verification.verified:
         return Outcome.CALIBRATED, f"{found}; {'; '.join(said)}. {as_good}"
     said += [f"equivalence is not shown for {', '.join(unproven)}: add replicates"]
-    return Outcome.NOT_TOLD_APART, f"{found}: no difference is found, but {'; '.join(said)}. {as_good}"
+    return Outcome.UNDECIDED, f"{found}: no difference is found, but {'; '.join(said)}. {as_good}"

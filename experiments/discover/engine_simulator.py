@@ -108,11 +108,7 @@ class EngineSimulator:
         return self._workers.simulate([self.case(point) for point in points], self.engine)
 
     def case(self, point: Point) -> Case:
-        """Build the case of a point.
-
-        Raise StudyError when the study refuses it: a value leaves what is physical, or two mechanisms exclude
-        each other. Raise ValueError when the point does not fit the study.
-        """
+        """Build the case of a point; StudyError where the study refuses it."""
         if len(point.theta) != len(self._factors):
             rule = f"Point.theta: must be one value for each of {', '.join(self._factors)}"
             raise ValueError(f"{rule}, got {point.theta!r}")

@@ -109,11 +109,7 @@ def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[Mechan
 
 
 def with_maximum(study: Study, mechanism: MechanismFactor, size: Quantity) -> MechanismFactor:
-    """Give a mechanism of its `library_for` another largest size.
-
-    Raise StudyError when the size is no quantity of its kind, not above its null, or more than the study can
-    have.
-    """
+    """Give a mechanism of its `library_for` another largest size; StudyError where it cannot be."""
     place = f"{study.file}: discover.maxima.{mechanism.name}"
     try:
         maximum = _in_unit(mechanism.parameters[0], size, mechanism.unit)

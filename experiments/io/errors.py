@@ -31,7 +31,7 @@ class Problem:
     value: str = ""
     """Value received; empty where the problem says it."""
     hint: str = ""
-    """What to do about it, as a sentence."""
+    """Advice, as a sentence."""
 
     def __str__(self) -> str:
         got = f", got {shortened(self.value)}" if self.value else ""

@@ -55,11 +55,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def require_new_file(path: Path, what: str) -> None:
-    """Refuse a file that exists or cannot be made; the attempt leaves nothing.
-
-    Raise InputError when it is one of these; the hint names its kind, e.g. ``a picture``. Raise OSError when
-    the disk is full.
-    """
+    """Refuse a file that exists or cannot be made; ``what`` names its kind. The attempt leaves nothing."""
     # pathlib raises where a name is too long for the system
     if os.path.lexists(path):
         raise InputError(str(path), "the file exists", hint=f"{what.capitalize()} never overwrites a file.")
@@ -67,10 +63,7 @@ def require_new_file(path: Path, what: str) -> None:
 
 
 def require_folder(path: Path) -> None:
-    """Refuse a folder that cannot be made or written to; the attempt leaves nothing.
-
-    Raise InputError when it is one of these. Raise OSError when the disk is full.
-    """
+    """Refuse a folder that cannot be made or written to; the attempt leaves nothing."""
     _require_place(path / "trial", path)
 
 
@@ -107,11 +100,7 @@ def has_temporary_name(path: Path) -> bool:
 
 
 def check_file(path: Path, largest: int) -> None:
-    """Refuse a file, which may come from anyone, before it is opened.
-
-    Raise OSError when there is no such file. Raise InputError when it is not a regular file, e.g. a pipe, or
-    has more than the largest number of bytes.
-    """
+    """Refuse, before it is opened, a file that is not a regular one or has more bytes than the largest."""
     facts = path.stat()
     if not stat.S_ISREG(facts.st_mode):
         raise InputError(str(path), "must be a regular file, not a pipe, a device or a folder")

@@ -34,10 +34,7 @@ _PROPERTIES: dict[type, tuple[str, ...]] = {
 
 
 def jsonable(value: Any) -> Any:
-    """Turn a result into plain JSON data: text, finite numbers, lists, dicts; other numbers are None.
-
-    Raise TypeError for a kind of value that has no plain form.
-    """
+    """Turn a result into plain JSON data, numbers that are not finite into None."""
     match value:
         case Enum():
             return value.value

@@ -47,10 +47,7 @@ class Quantity:
 
     @classmethod
     def parse(cls, value: object) -> Quantity:
-        """Read a number, text such as ``"110 mm"``, or a quantity.
-
-        Raise ValueError when the value is neither, or the number is not finite.
-        """
+        """Read a number, text such as ``"110 mm"``, or a quantity; ValueError where it is no finite one."""
         if isinstance(value, cls):
             quantity = value
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -101,10 +98,7 @@ def _float(value: float) -> float:
 
 
 def dimension_of_unit(unit: str) -> str:
-    """Name the dimension of an SI unit, as a parameter or an observable of the engine has it.
-
-    Raise ValueError when it is not an SI unit of a known dimension.
-    """
+    """Name the dimension of an SI unit of the engine; ValueError where no known dimension has it."""
     if unit == "1":
         return ""
     for dimension, sizes in UNITS.items():
@@ -114,10 +108,7 @@ def dimension_of_unit(unit: str) -> str:
 
 
 def unit_size(unit: str, dimension: str) -> float:
-    """Size of a unit in the base unit of its dimension.
-
-    Raise ValueError when the unit is not one of the dimension's; the message names those.
-    """
+    """Size of a unit in the base unit of its dimension; ValueError where it is not one of those."""
     if not dimension and unit:
         raise ValueError(f"must be a plain number without the unit {unit!r}")
     known = UNITS[dimension] if dimension else {"": 1.0}

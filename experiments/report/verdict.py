@@ -10,7 +10,7 @@ from experiments.report.kit.sentences import say
 
 HEADLINES = {
     Outcome.CALIBRATED: "Calibrated",
-    Outcome.NOT_TOLD_APART: "No difference found",
+    Outcome.UNDECIDED: "No difference found",
     Outcome.MISSED: "Target missed",
     Outcome.NO_SIGNIFICANT_FACTOR: "No significant factor",
     Outcome.TARGET_NOT_REACHED: "Target not reached",

@@ -49,10 +49,7 @@ def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def check_laws(document: Mapping[str, Any], sections: Mapping[str, Any], path: Path) -> None:
-    """Check that a study has the laws of its card, or says which others the card has, ``solver.card_laws``.
-
-    Raise StudyError when it has others and does not say so.
-    """
+    """Refuse a study that has other laws than its card and does not say so, by ``solver.card_laws``."""
     solver = document.get("solver", {})
     if not isinstance(solver, Mapping) or LAWS not in solver:
         return
@@ -67,10 +64,7 @@ def check_laws(document: Mapping[str, Any], sections: Mapping[str, Any], path: P
 
 
 def read_card(path: Path) -> dict[str, Any]:
-    """Read the sections of a card, its clump files by their whole path, and the solver of its bridge.
-
-    Raise StudyError when the file cannot be read, or is no card.
-    """
+    """Read the sections of a card, its clump files by their whole path, and the solver of its bridge."""
     _, card = read_toml(path)
     sections = card.get(MATERIAL)
     if not isinstance(sections, dict) or not set(sections) <= set(SECTIONS):
@@ -94,10 +88,7 @@ def is_card(path: Path) -> bool:
 
 
 def card_document(card: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """Lay out the study of a card's own test, from what the card at a path says.
-
-    Raise StudyError when it is no card, or does not say which test it was fitted to.
-    """
+    """Lay out the study of a card's own test; StudyError where the card does not say which."""
     fitted = card.get("fitted", {})
     if not isinstance(fitted, Mapping) or "test" not in fitted:
         raise StudyError(str(path), "lacks the test that it was fitted to, [fitted.test.NAME]")

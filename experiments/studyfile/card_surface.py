@@ -32,7 +32,7 @@ def surface_table(surface: Surface) -> dict[str, Any]:
 
 
 def surface_of(table: object, units: Mapping[str, str], place: str) -> Surface:
-    """Fit the surface of a card again; StudyError when `surface_table` did not lay out the table."""
+    """Fit the surface of a card again; StudyError where `surface_table` did not lay it out."""
     try:
         if not isinstance(table, Mapping):
             raise KeyError("factors")
@@ -50,7 +50,7 @@ def surface_of(table: object, units: Mapping[str, str], place: str) -> Surface:
 
 
 def card_surfaces(card: Mapping[str, Any], path: Path) -> dict[str, Surface]:
-    """Fit every surface of a card again, by the response's name; StudyError when one is not a surface."""
+    """Fit every surface of a card again, by the response's name; errors as in `surface_of`."""
     units = {name: str(factor.get("unit", "")) for name, factor in card.get("factor", {}).items()}
     tables = card.get(SURFACE, {})
     return {name: surface_of(table, units, f"{path}: {SURFACE}.{name}") for name, table in tables.items()}

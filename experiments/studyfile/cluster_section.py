@@ -72,9 +72,6 @@ class Profile(Section):
 
 
 def read_profile(path: Path) -> ClusterSection:
-    """Read a profile: a TOML file whose one section is ``[cluster]``.
-
-    Raise StudyError when it cannot be read or breaks a rule.
-    """
+    """Read a profile: a TOML file whose one section is ``[cluster]``."""
     text, document = read_toml(path)
     return validated(Profile, document, Places.read(path, text)).cluster

@@ -52,10 +52,7 @@ class EngineSection(Section):
 
 
 def words_of(command: str) -> list[str]:
-    """Split a command into its words: blanks part them, quotes hold them together, nothing else is special.
-
-    Raise ValueError when a quotation is not closed.
-    """
+    """Split a command at blanks, except in quotes; ValueError where a quotation is not closed."""
     lexer = shlex.shlex(command, posix=True, punctuation_chars=False)
     lexer.whitespace_split, lexer.commenters, lexer.escape = True, "", ""
     try:

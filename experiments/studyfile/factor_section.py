@@ -91,17 +91,11 @@ class FactorSection(Section):
         return max(least) / size, min(most) / size
 
     def natural(self, value: object) -> float:
-        """Read a quantity (``"34 MPa"``, 0.46) as a number in the natural unit.
-
-        Raise ValueError when it is no quantity of the factor's dimension.
-        """
+        """Read a quantity (``"34 MPa"``, 0.46) in the natural unit; ValueError where it has another."""
         return self.dimension.to_unit(value, self.unit)
 
     def write(self, changes: dict[str, Any], value: float, places: Places) -> None:
-        """Add a value in the natural unit, at each of its places, to the changes of a study's physics.
-
-        Raise StudyError when the value leaves what is physical.
-        """
+        """Add a value in the natural unit to the changes of a study; StudyError beyond its limits."""
         for setter in self.setters:
             try:
                 setter.write(changes, Quantity(float(value), self.unit))
@@ -141,10 +135,7 @@ class FactorTable(Section):
 
 
 def natural_value(sections: Iterable[FactorSection], name: str, value: object) -> float:
-    """Read the value of a factor with its unit as a number in its natural unit.
-
-    Raise ValueError when there is no such factor, or the value is no quantity of its dimension.
-    """
+    """Read a factor's value with its unit in natural units; ValueError where there is no such factor."""
     by_name = {section.name: section for section in sections}
     if name not in by_name:
         raise ValueError(f"must name a factor, {nearest_name(name, list(by_name))}")

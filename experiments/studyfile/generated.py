@@ -28,17 +28,17 @@ class EngineSection(Section):
     """Class of the object."""
     plain_numbers: ClassVar[bool] = False
     """A number without a unit is taken in SI."""
-    beside: ClassVar[Mapping[str, Any]] = {}
+    trial_arguments: ClassVar[Mapping[str, Any]] = {}
     """Other arguments of the class, to try the parameters with."""
 
     @model_validator(mode="after")
     def _can_be(self) -> Self:
-        self.build(**self.beside)
+        self.build(**self.trial_arguments)
         return self
 
-    def build(self, **beside: Any) -> Any:
+    def build(self, **others: Any) -> Any:
         """Build the object; ValueError when it breaks a rule of the engine."""
-        return self.engine(**beside, **dict(self))
+        return self.engine(**others, **dict(self))
 
 
 class LibrarySection(Section):

@@ -62,10 +62,7 @@ def load_study(
 
 
 def load_card(path: Path) -> Study:
-    """Read a material card as the study of its own test, at the values that it chose.
-
-    Raise StudyError when the file cannot be read, is no card, or does not say which test it was fitted to.
-    """
+    """Read a material card as the study of its own test; StudyError where it names none."""
     text, card = read_toml(path)
     return build_study(card_document(card, path), Places.read(path, text))
 
@@ -93,7 +90,7 @@ def build_study(document: dict[str, Any], places: Places) -> Study:
 
 
 def study_scales(path: str | Path | None = None) -> tuple[str, ...]:
-    """Return the names of the scales of a study file; StudyError when the file cannot be read."""
+    """Return the names of the scales of a study file."""
     path = BUCKWHEAT if path is None else Path(path)
     return tuple(_scales(path, read_toml(path)[1]))
 

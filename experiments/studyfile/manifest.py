@@ -55,10 +55,7 @@ def _shown(value: object) -> str:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read what `write_manifest` wrote.
-
-    Raise StoreError when the folder has no such file, or it cannot be read.
-    """
+    """Read what `write_manifest` wrote; StoreError where it cannot be read."""
     path = folder / MANIFEST
     try:
         manifest: dict[str, Any] = json.loads(read_file(path, LARGEST))

@@ -17,10 +17,7 @@ class MechanismsSection(LibrarySection):
     """``[mechanism]``: the mechanisms of a study, in the order of the library."""
 
     def mechanisms(self) -> tuple[Mechanism, ...]:
-        """Build the engine's mechanisms: those that the study names.
-
-        Raise ValueError when a parameter leaves what is physical, or two of them exclude each other.
-        """
+        """Build the engine's mechanisms; ValueError where two of them exclude each other."""
         built = tuple(section.build() for section in self.given.values())
         for kind in ("grains", "walls"):
             for name, other in clashes(tuple(one for one in built if one.acts_between(kind))):

@@ -11,10 +11,7 @@ TEMPLATE = Path(__file__).parents[1] / "studies" / "template.toml"
 
 
 def write_template(name: str, folder: Path | None = None) -> Path:
-    """Write a commented study file for a grain, ``NAME.toml`` in a folder or in the current one.
-
-    Raise InputError when the name has other characters, or the file exists.
-    """
+    """Write a commented study file ``NAME.toml`` for a grain, in a folder or in the current one."""
     path = new_study_path(name, folder)
     text = TEMPLATE.read_text(encoding="utf-8").replace("{name}", path.stem).replace("{file}", path.name)
     write_text(path, text)
@@ -22,7 +19,7 @@ def write_template(name: str, folder: Path | None = None) -> Path:
 
 
 def new_study_path(name: str, folder: Path | None = None) -> Path:
-    """Return the path of a new study file of a grain's name; errors as by `write_template`."""
+    """Return the path of a new study file; InputError where the name cannot be one or the file exists."""
     name = name.removesuffix(".toml")
     if not name or not all(character.isalnum() or character in " _-" for character in name):
         raise InputError("NAME", "must have letters, digits, spaces, - and _ only", name)

@@ -252,7 +252,7 @@ _INSTRUMENTS = {
 """Instrument of each unit, in a test that leaves no heap."""
 
 VERSION = 2
-"""Of the definitions; values measured by other ones are measured again."""
+"""Version of the definitions; values measured by other ones are measured again."""
 
 
 def observables_of(declared: Mapping[str, Declared], leaves_a_heap: bool) -> dict[str, Observable]:

@@ -27,10 +27,7 @@ def widths(diameter: float, shape: ClumpShape | ShapeMixture, size: float) -> fl
 
 
 def narrowness(diameter: float | None, shape: ClumpShape | ShapeMixture, size: float) -> str:
-    """Say that a container is narrow; empty where it is not, and where it has no diameter.
-
-    Raise ValueError when grains cannot pass one another in it.
-    """
+    """Say that a container is narrow, or nothing; ValueError where grains cannot pass one another."""
     if diameter is None:
         return ""
     found = widths(diameter, shape, size)

@@ -36,10 +36,7 @@ def check_factor_names(
     scenes: Iterable[SceneSection] = (),
     responses: Collection[str] = (),
 ) -> None:
-    """Refuse factors whose name a table has for something else, be it of these scenes and responses.
-
-    Raise StudyError with every such factor, and its place.
-    """
+    """Refuse factors that are named like a column of the tables, also of these scenes and responses."""
     measured = {name for scene in scenes for name in observables_of(scene.observables, scene.leaves_a_heap)}
     taken = RESERVED | measured | set(responses)
     problems = list(_problems(names, taken, places))

@@ -16,8 +16,8 @@ from experiments.studyfile.generated import EngineSection, LibrarySection, libra
 class TestSection(EngineSection):
     """``[scene.NAME]``: parameters of a test."""
 
-    # None of a scene's rules is about the material of its walls.
-    beside: ClassVar[Mapping[str, Any]] = {"wall_material": Material(7800.0, 70e9, 0.3)}
+    # No rule of a scene is about the material of its walls.
+    trial_arguments: ClassVar[Mapping[str, Any]] = {"wall_material": Material(7800.0, 70e9, 0.3)}
 
 
 class SceneSection(LibrarySection):

@@ -40,15 +40,12 @@ class Dimension:
     """Unit of a number that is written without one; ``""``: a number needs its unit."""
 
     def to_base(self, value: object) -> float:
-        """Read a quantity and convert it; ValueError when it is no quantity of the dimension."""
+        """Read a quantity and convert it; ValueError where it is none of the dimension."""
         quantity = Quantity.parse(value)
         return Quantity(quantity.number, quantity.unit or self.plain).to_base(self.name)
 
     def to_unit(self, value: object, unit: str) -> float:
-        """Read a quantity and express it in a unit of the dimension.
-
-        Raise ValueError when it is no quantity of the dimension.
-        """
+        """Read a quantity and express it in a unit of the dimension; ValueError where it has another."""
         quantity = Quantity.parse(value)
         return quantity.number if quantity.unit == unit else self.to_base(quantity) / self.size(unit)
 

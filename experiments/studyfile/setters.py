@@ -43,10 +43,7 @@ class Setter:
     """Reads a quantity as the field does: in SI, within its bounds."""
 
     def write(self, changes: dict[str, Any], quantity: Quantity) -> None:
-        """Add a quantity at this place to the changes of a study's physics.
-
-        Raise ValueError when it leaves the bounds.
-        """
+        """Add a quantity at this place to the changes of a study's physics; ValueError beyond its bounds."""
         try:
             value = self.number.validate_python(quantity)
         except ValidationError as error:
@@ -58,10 +55,7 @@ class Setter:
 
 
 def setter_at(parameter: str) -> Setter:
-    """Compile the setter of a place, as ``contact.grain-grain.static_friction``.
-
-    Raise ValueError when there is no quantity.
-    """
+    """Compile the setter of a place, as ``contact.grain-grain.static_friction``; ValueError without one."""
     # A place may lead elsewhere once a library has grown; laws are loaded for a place in one of them alone.
     laws = (mechanisms_section(),) if parameter.startswith("mechanism.") else ()
     return _compiled(parameter, scene_section(), *laws)
@@ -95,10 +89,7 @@ def changed(value: Any, change: Any) -> Any:
 
 
 def revised(section: SectionT, change: Mapping[str, Any]) -> SectionT:
-    """Copy a section with values by key, nested as in a file; a section that is missing is made of them.
-
-    Raise ValueError when there is no such key, or a value or the whole section breaks a rule.
-    """
+    """Copy a section with values by key, nested as in a file; ValueError where one breaks a rule."""
     known, update = fields_of(type(section)), {}
     for key, value in change.items():
         if key not in known:

@@ -40,10 +40,7 @@ class LawsSection(EngineSection):
         return self
 
     def laws(self) -> ContactLaws:
-        """Build the engine's laws.
-
-        Raise ValueError when there is no set of the name, or the choices do not go together.
-        """
+        """Build the engine's laws; ValueError where the choices do not go together."""
         own = {name: getattr(self, name) for name in self.model_fields_set if name != BASE}
         return replace(_named(self.base), **own)
 
@@ -87,13 +84,10 @@ class SolverSection(Section):
     corrected_for: str | None = Field(default=None)
     """Solver that a bridge has corrected the values for; a study takes it from its material card."""
     card_solver: str | None = Field(default=None)
-    """That solver, where the study runs in another one; its values are taken as they are."""
+    """Solver of the correction, where the study runs in another one and takes the values as they are."""
 
     def check_solver(self, name: str, place: str) -> None:
-        """Check that values corrected for one solver run in it, or that the study says which one it was.
-
-        Raise StudyError when the solver of this name is another one, and the study does not say so.
-        """
+        """Refuse to run values corrected for one solver in another, unless the study says so."""
         if self.corrected_for in (None, name, self.card_solver):
             return
         solver = self.corrected_for
@@ -103,7 +97,7 @@ class SolverSection(Section):
 
 
 def laws_of(solver: Mapping[str, Any]) -> ContactLaws:
-    """Laws that a ``[solver]`` names; ."""
+    """Return the laws that a ``[solver]`` names."""
     return SolverSection.model_validate(solver).laws  # type: ignore[no-any-return]
 
 

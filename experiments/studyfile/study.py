@@ -128,11 +128,7 @@ class Study(Physics):
 
     @cached_property
     def target(self) -> Target:
-        """Responses that the cases must match.
-
-        Raise StudyError when the study has none, they are still to be measured, or its test leaves no heap to
-        match.
-        """
+        """Responses that the cases must match; StudyError where they are missing or still to be measured."""
         if self.target_section is not None and self.target_section.lacks_a_heap(self.scenes):
             problem = "needs an observable: this test leaves no heap whose angle could be the target"
             raise StudyError(f"{self.file}: target", problem)
@@ -175,10 +171,7 @@ class Study(Physics):
         return tuple(self.condition_sections.values()) or (BASE,)
 
     def under(self, condition: str) -> Study:
-        """Study of the test under one condition; it takes settings of all factors of this one.
-
-        Raise StudyError when there is no such condition.
-        """
+        """Return the study of the test under one condition; it takes settings of all factors of this one."""
         known = {each.name: each for each in self.conditions}
         if condition not in known:
             rule = f"must be a condition of the study, {nearest_name(condition, list(known))}"
@@ -194,10 +187,7 @@ class Study(Physics):
         return study
 
     def with_engine(self, engine: Mapping[str, Any]) -> Study:
-        """Return the same study, whose cases another engine simulates: an ``[engine]`` as written.
-
-        Raise StudyError when the section breaks a rule.
-        """
+        """Return the same study, whose cases another engine simulates: an ``[engine]`` as written."""
         section = validated(EngineSection, engine, self._places, ("engine",))
         return self._changed(self.document | {"engine": dict(engine)}, engine=section)
 
@@ -207,11 +197,7 @@ class Study(Physics):
         responses: Iterable[ResponseSection] = (),
         measurement: MeasurementSection | None = None,
     ) -> Study:
-        """Return the same study, whose cases must match other numbers, read in another way where it says so.
-
-        Raise StudyError when two have one name, there is no such scene or observable, or a measurement is
-        wrong.
-        """
+        """Return the same study, whose cases must match other numbers, also read in another way."""
         sections, reading = tuple(responses), measurement or self.measurement
         document = {key: value for key, value in self.document.items() if key not in ("target", "response")}
         document["target"] = target.table
@@ -310,10 +296,7 @@ class Study(Physics):
         self._target = build_target(target, responses, self.scenes, held_out, self._places)
 
     def natural_settings(self, settings: Mapping[str, object], source: str = "settings") -> dict[str, float]:
-        """Read factor values with their units, as ``{"B": "34 MPa", "E": 0.46}``, in natural units.
-
-        Raise StudyError when there is no such factor, or a value is no quantity of its dimension.
-        """
+        """Read factor values with their units, as ``{"B": "34 MPa", "E": 0.46}``, in natural units."""
         natural = {}
         for name, value in settings.items():
             try:

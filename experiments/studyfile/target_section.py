@@ -108,11 +108,7 @@ class ResponseSection(Section):
         }
 
     def response(self, unit: str, measured: bool, path: KeyPath, places: Places) -> Response:
-        """Build the response of the campaign; ``unit`` is that of its observable.
-
-        Where it is not ``measured``, a twin study simulates it, or its measurements are still to be taken.
-        Raise StudyError when a measurement is missing, or is no quantity of the observable's dimension.
-        """
+        """Build the response of the campaign in its observable's unit; a twin is not ``measured``."""
         values = {name: self._value(name, unit, path, places) for name in ("mean", "sd")}
         sample = None
         if measured:
@@ -227,9 +223,9 @@ def _source(target: TargetSection, places: Places) -> str | None:
     numbers = [name for name in MEASUREMENTS if getattr(target, name) is not None]
     if target.twin is not None:
         return None
-    if given and (beside := [*given[1:], *numbers]):
+    if given and (others := [*given[1:], *numbers]):
         rule = "must be pictures, a file, or mean, sd and n, and only one of these"
-        raise StudyError(places.of(("target", given[0])), rule, f"{given[0]} and {', '.join(beside)}")
+        raise StudyError(places.of(("target", given[0])), rule, f"{given[0]} and {', '.join(others)}")
     return given[0] if given else None
 
 

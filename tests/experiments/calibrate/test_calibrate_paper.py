@@ -95,7 +95,7 @@ def target(study: PaperStudy) -> TargetResult:
 
 @pytest.fixture(scope="module")
 def noise() -> NoiseFloorResult:
-    """The paper has no noise floor; the centre of its composite design has five replicates."""
+    """Take the noise floor, which the paper lacks, from the five centre runs of its composite design."""
     runs = published("central_composite")
     center = runs[(runs["E_coded"] == 0) & (runs["F_coded"] == 0)]
     return NoiseFloorResult({"angle": noise_floor(center[ANGLE].to_numpy(dtype=float))}, pd.DataFrame(), ())

@@ -84,7 +84,7 @@ def measured(folder: Path, count: int) -> None:
 
 
 def check(campaign: Campaign) -> None:
-    assert campaign.outcome in (Outcome.CALIBRATED, Outcome.NOT_TOLD_APART), campaign.reason
+    assert campaign.outcome in (Outcome.CALIBRATED, Outcome.UNDECIDED), campaign.reason
     names = ["outline_direction_1", "outline_direction_2"]
     assert [response.name for response in campaign.responses] == names
     joint = campaign.optimum.joint

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from emulated import EmulatedSimulator, emulated_heaps
 from typer.testing import CliRunner
 
+from dem_warp import CaseResult
+from doe.discrepancy import Outcomes, Point, fit_emulator
 from experiments.cli import app
+from experiments.discover.engine_simulator import EngineSimulator
+from experiments.discover.search import Search
 from experiments.runs.choices import measured_study, prepare
 from experiments.runs.request import RunRequest
 from experiments.runs.run_folder import OUTCOMES
 from experiments.runs.search import SearchData, run_search
 from experiments.studyfile import Study, load_study, loading
-from experiments.studyfile.observables import PHOTOGRAPHED
+from experiments.studyfile.observables import BY_NAME, PHOTOGRAPHED
 from experiments.studyfile.places import Places
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
@@ -108,12 +114,34 @@ def test_heaps_that_lack_nothing_raise_no_alarm_with_photographs_only(tmp_path: 
     assert np.isfinite(means).sum(axis=1).tolist() == [len(PHOTOGRAPHED)] * len(means)
 
 
-def test_a_tilted_plate_is_found_on_the_real_engine(tmp_path: Path) -> None:
+def test_a_tilted_plate_is_found_and_added_to_the_study(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cone: Callable[..., CaseResult]
+) -> None:
     # As many points as the model has parameters; half of them would leave the noise of the runs too large.
     few = {"refinement_points": 4, "refinement_rounds": 1, "shortlist": 1, "direct_runs": 4}
     trial = load_study(STUDY, "bench", {"discover": {"settings": few}})
+    world = EmulatedSimulator(fit_emulator(Search.of(trial).read_bank(TRIAL / "bank-bench.npz")))
+
+    def fresh(engine: EngineSimulator, points: Sequence[Point], _: object = None) -> Outcomes:
+        known = world(points).values
+        values = np.full((len(points), len(engine.observables)), np.nan)
+        values[:, : known.shape[1]] = known
+        return Outcomes(values, ("",) * len(points))
+
+    monkeypatch.setattr(EngineSimulator, "__call__", fresh)
+    monkeypatch.setattr(EngineSimulator, "heaps", lambda engine, points: [cone() for _ in points])
     request = RunRequest(out=tmp_path / "out", device="cpu", workers=1)
-    ended = run_search(prepare(trial, request), SearchData(TRIAL / "tilted-bench.csv"))
+    data = tmp_path / "measured.csv"
+    theta = tuple(factor.center for factor in trial.factors)
+    measured = emulated_heaps(world, theta, {"plate_tilt": 5.0}, 8, 1)
+    lines = [
+        f"{condition},{number},{name},{value!r},{BY_NAME[name].unit.removeprefix('1')}"
+        for condition, rows in measured.values.items()
+        for number, row in enumerate(rows.tolist(), 1)
+        for name, value in zip(measured.observables, row, strict=True)
+    ]
+    data.write_text("\n".join(["condition,replicate,observable,value,unit", *lines]), encoding="utf-8")
+    ended = run_search(prepare(trial, request), SearchData(data))
     found = ended.discovery
     assert found is not None
     assert found.named == ("plate_tilt",)

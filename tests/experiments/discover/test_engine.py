@@ -115,10 +115,12 @@ def test_cases_that_fail_are_kept_with_their_reasons_and_not_simulated_again(
     endings = [cone(status=status, reason=why) for status, why in zip(statuses, reasons, strict=True)]
     monkeypatch.setattr(own, "simulate", Scripted(endings))
     with build(study, table) as simulator:
-        assert simulator(POINTS).reasons == reasons
+        found = simulator(POINTS).reasons
+    # The costly case, of the wide tube, is simulated first.
+    assert found == (reasons[1], reasons[0], reasons[2])
     monkeypatch.setattr(own, "simulate", Scripted([]))
     again = build(study, table)(POINTS)
-    assert again.reasons == reasons
+    assert again.reasons == found
     assert np.isnan(again.values).all()
 
 
@@ -193,5 +195,5 @@ def test_a_table_gives_back_what_was_saved(table: OutcomeTable) -> None:
 def test_a_file_that_is_no_table_is_refused(table: OutcomeTable) -> None:
     table.path.parent.mkdir()
     table.path.write_text("something else" * 100)
-    with pytest.raises(StoreError, match="must be a table of outcomes"):
+    with pytest.raises(StoreError, match="is not a table of outcomes"):
         table.load(["1"])
