@@ -38,9 +38,8 @@ def test_a_capsule_is_its_row_of_spheres():
     assert fit.coverage > 0.9
 
 
-@pytest.mark.parametrize("text", ["tri-pyramid:5.90x3.93", "ellipsoid:6x3x2.5"])
-def test_inscribed_spheres_stay_inside_and_more_cover_more(text):
-    solid = parse_solid(text)
+def test_inscribed_spheres_stay_inside_and_more_cover_more_and_protruding_ones_overshoot():
+    solid = parse_solid("tri-pyramid:5.90x3.93")
     fits = [fit_clump(solid, count) for count in (1, 3, 9)]
     for fit in fits:
         assert fit.overshoot == 0.0
@@ -50,12 +49,8 @@ def test_inscribed_spheres_stay_inside_and_more_cover_more(text):
     coverages = [fit.coverage for fit in fits]
     assert coverages == sorted(coverages)
     assert coverages[-1] > 1.5 * coverages[0]
-
-
-def test_protrusion_covers_more_and_overshoots():
-    solid = parse_solid("tri-pyramid:5.90x3.93")
-    inscribed, protruding = fit_clump(solid, 9), fit_clump(solid, 9, protrusion=0.2e-3)
-    assert protruding.coverage > inscribed.coverage
+    protruding = fit_clump(solid, 9, protrusion=0.2e-3)
+    assert protruding.coverage > coverages[-1]
     assert protruding.overshoot > 0.0
     # Inside and outside together are the union's volume.
     total = protruding.coverage + protruding.overshoot
@@ -83,7 +78,7 @@ def test_a_mesh_file_comes_back_in_metres(tmp_path):
 
 @pytest.mark.parametrize("kind", MESH_KINDS)
 def test_faces_turned_over_are_turned_back_without_networkx(tmp_path, monkeypatch, kind):
-    """Two bodies, some of their faces turned over; trimesh itself would need networkx."""
+    """Read two bodies, some of their faces turned over; trimesh itself would need networkx."""
     for module in (trimesh.graph, trimesh.repair):
         monkeypatch.setattr(module, "nx", None)
     ball, box = (
@@ -122,9 +117,7 @@ def test_bad_mesh_files_are_refused(tmp_path):
     ("text", "message"),
     [
         ("cube:3", "solid: must be one of sphere:DIAMETER, ellipsoid:LENGTHxWIDTHxTHICKNESS"),
-        ("sphere", "'sphere': must be sphere:DIAMETER in mm"),
         ("cylinder:6", "must be cylinder:LENGTHxDIAMETER in mm: got 1 dimensions"),
-        ("cylinder:6x-2", "diameter: must be positive and finite"),
         ("ellipsoid:6x3xthin", "must be ellipsoid:LENGTHxWIDTHxTHICKNESS in mm: could not convert"),
         ("capsule:2x2", "length: must be above the diameter"),
     ],

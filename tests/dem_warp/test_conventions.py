@@ -39,13 +39,8 @@ SPEED = 0.1
     ("build", "message"),
     [
         (lambda: ContactLaws(rolling="none"), r"ContactLaws.rolling: must be one of own_spin, .* got 'none'"),
-        (lambda: ContactLaws(sliding=3), r"ContactLaws.sliding: must be one of spring, .* got 3"),
         (lambda: ContactLaws(rolling_stiffness=0.0), r"rolling_stiffness: must be positive .* got 0.0"),
         (lambda: ContactLaws(damping_rate=1.0), r"damping_rate: must be given with .* got 1.0 with 'tsuji'"),
-        (
-            lambda: ContactLaws(normal_damping="mass_velocity", tangential_damping="normal"),
-            r"damping_rate: must be given with the damping mass_velocity .* got None",
-        ),
         (
             lambda: ContactLaws(normal_damping="mass_velocity", damping_rate=1.0),
             r"tangential_damping \(with normal_damping mass_velocity\): must be one of normal, none",
@@ -109,11 +104,8 @@ def test_every_form_has_its_own_law(law):
     assert len({contact_law((), BASE_FORMS._replace(**{law: name})) for name in known}) == len(known)
 
 
-# ---- dampings and restitution ------------------------------------------------------------------------------
-
-
 def falling(laws: ContactLaws, restitution: float, steps: int, **more: Any) -> tuple[Any, float, Record]:
-    """Contact, step [s] and motion of a ball that falls on a plane with `SPEED`."""
+    """Return contact, step [s] and motion of a ball that falls on a plane with `SPEED`."""
     contact = pair(restitution=restitution, laws=laws, **more)
     step = Impact.of(contact, RADIUS, ball_mass(), SPEED).duration / steps
     place = [0.0, 0.0, RADIUS + 1e-12]
@@ -122,8 +114,8 @@ def falling(laws: ContactLaws, restitution: float, steps: int, **more: Any) -> t
 
 
 @pytest.mark.parametrize("restitution", DAMPINGS)
-@pytest.mark.parametrize("chosen", [0.2, 0.5, 0.9])
-def test_the_restitution_comes_back_that_the_damping_stands_for(restitution, chosen):
+@pytest.mark.parametrize("chosen", [0.2, 0.5])
+def test_an_impact_has_the_restitution_of_its_damping(restitution, chosen):
     # Thornton's fit is for a damping that never attracts, the others for one that may.
     attraction = "clamped" if restitution == "thornton" else "free"
     laws = ContactLaws(restitution=restitution, attraction=attraction)
@@ -139,7 +131,7 @@ def test_the_restitution_comes_back_that_the_damping_stands_for(restitution, cho
 
 
 @pytest.mark.parametrize("restitution", DAMPINGS)
-def test_dampings_fall_with_the_restitution_and_refuse_what_is_none(restitution):
+def test_dampings_fall_with_the_restitution_and_refuse_bad_ones(restitution):
     values = [DAMPINGS[restitution](e) for e in np.linspace(0.1, 1.0, 19)]
     assert (np.diff(values) < 0.0).all()
     assert values[-1] == pytest.approx(0.0, abs=2e-3)  # the polynomial ends at 1.6e-3
@@ -182,9 +174,6 @@ def test_the_overlap_circle_has_twice_hertz_s_area():
     # F = 4/3 E* a d with a = sqrt(2 R* d) in place of sqrt(R* d)
     assert static_overlap(circle, 1.0) == pytest.approx(static_overlap(hertz, 1.0) * 2.0 ** (-1.0 / 3.0))
     assert circle.shear_modulus / hertz.shear_modulus == pytest.approx(math.sqrt(2.0))
-
-
-# ---- sliding -----------------------------------------------------------------------------------------------
 
 
 @wp.kernel
@@ -233,11 +222,7 @@ def test_friction_follows_the_size_of_a_force_that_attracts():
     np.testing.assert_allclose(ends["size"], 0.3, rtol=1e-6)
 
 
-# ---- histories ---------------------------------------------------------------------------------------------
-
-
 def oblique(history: str) -> tuple[Any, float, Record]:
-    """An elastic impact on a plane, in which nothing slides and the tangential spring alone acts."""
     laws = ContactLaws(tangential_history=history, tangential_damping="none")
     contact = pair(friction=1e6, laws=laws)
     step = Impact.of(contact, RADIUS, ball_mass(), SPEED).duration / 200.0
@@ -246,7 +231,7 @@ def oblique(history: str) -> tuple[Any, float, Record]:
 
 
 def remembered(history: str, stiffness: np.ndarray, radius: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Force of the spring in each step from its stiffness, the contact radius and what the surfaces move."""
+    """Return the spring force of each step from stiffness, contact radius and the surfaces' motion."""
     forces, memory, before = [], 0.0, 0.0
     for k, a, move in zip(stiffness, radius, moved, strict=True):
         if "rescaled" in history and a < before:

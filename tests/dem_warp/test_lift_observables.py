@@ -1,4 +1,4 @@
-"""Measurements of a lifted cylinder besides its heap: loads, the falling surface, the place of the mass."""
+"""Other measurements of a lifted cylinder: loads, the falling surface, the place of the mass."""
 
 import math
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from worlds import (
     RADIUS,
     SMALL_TUBE,
     TIME_STEP,
-    assert_measured_as_told,
+    assert_measured_as_declared,
     assert_same_bits,
     ball_mass,
     grains,
@@ -37,41 +37,43 @@ SLANT = math.sqrt(0.5)
 
 
 def with_friction(friction: float, **options: Any) -> Case:
-    """The small case, its scene with options and some friction on tube and plate."""
+    """Return the small case, its scene with options and some friction on tube and plate."""
     case = small_case(scene=replace(SMALL_TUBE, **options))
     return replace(case, grain_wall=replace(case.grain_wall, static_friction=friction))
 
 
 def simulated(case: Case) -> CaseResult:
-    """Result of a case that finishes."""
     [result] = simulate([case], device="cpu", workers=1)
     assert (result.status, result.reason) == ("finished", "")
     return result
 
 
-@pytest.fixture(scope="module")
-def heap() -> CaseResult:
-    """The small heap as it is."""
-    return simulated(small_case())
-
-
-def load(setup: WorldSetup, wall: int, settled: float, precision: str = "mixed") -> float:
-    """Load of a wall along z, once its world has settled for a while [s]: the mean of 0.05 s [N]."""
-    solver = solve(replace(setup, weighed=wall), precision=precision)
+def loads(setup: WorldSetup, settled: float, precision: str = "mixed") -> list[float]:
+    """Return the mean load of each wall along z [N] over 0.05 s, once a world has settled for a time [s]."""
+    solver = solve(*(replace(setup, weighed=wall) for wall in (0, 1)), precision=precision)
     run_for(solver, settled)
-    [before] = solver.view([0])
+    before = solver.view([0, 1])
     run_for(solver, 0.05)
-    [after] = solver.view([0])
-    return (after.impulse - before.impulse) / (after.time - before.time)
+    spans = zip(before, solver.view([0, 1]), strict=True)
+    return [(end.impulse - start.impulse) / (end.time - start.time) for start, end in spans]
 
 
-@pytest.mark.parametrize("wall", [0, 1])
-def test_each_side_of_a_groove_carries_half_of_a_ball(wall):
+def test_each_side_of_a_groove_carries_half_of_a_ball():
     walls = Plane(normal=(SLANT, 0.0, SLANT)), Plane(normal=(-SLANT, 0.0, SLANT))
     place = [0.0, 0.0, RADIUS / SLANT]
     groove = world(grains(place), pair(restitution=0.1), TIME_STEP, walls=walls, gravity=(0.0, 0.0, -GRAVITY))
     # At rest; a count is 2**-29 of the weight at the most, and rounds a force of that order.
-    assert load(groove, wall, 0.3, "double") == pytest.approx(-0.5 * WEIGHT, rel=1e-8)
+    assert loads(groove, 0.3, "double") == pytest.approx([-0.5 * WEIGHT] * 2, rel=1e-8)
+
+
+def test_floor_and_tube_carry_the_grains_between_them():
+    bed = pile(count=16)
+    weight = bed.masses.sum() * GRAVITY
+    floor, tube = loads(bed, 0.4)
+    # The grains still tremble by some 2e-5 of g, the sum of what the boundaries do not balance.
+    assert floor + tube == pytest.approx(-weight, rel=1e-4)
+    # Each of them carries far more than that.
+    assert abs(tube) > 0.01 * weight
 
 
 @pytest.mark.parametrize("precision", ["double", "mixed"])
@@ -96,15 +98,6 @@ def test_where_no_wall_is_weighed_nothing_adds_up_and_no_bit_moves():
     assert_same_bits(state(weighed), state(not_weighed))
 
 
-def test_floor_and_tube_carry_what_is_poured_between_them():
-    weight = pile().masses.sum() * GRAVITY
-    floor, tube = (load(pile(), wall, 0.6) for wall in (0, 1))
-    # The grains still tremble by some 2e-5 of g, the sum of what the boundaries do not balance.
-    assert floor + tube == pytest.approx(-weight, rel=1e-4)
-    # What they carry apart is far more than that.
-    assert abs(tube) > 0.01 * weight
-
-
 def test_a_tube_without_friction_draws_no_grains_along(heap):
     # Its lower rim alone can push at grains, few of them at a time, and it passes them sideways.
     smooth = simulated(with_friction(0.0, plate_friction=0.4))
@@ -127,7 +120,7 @@ def test_a_heap_has_its_mass_where_its_grains_are(heap):
 
 
 def test_a_heap_has_every_observable_and_its_surface_falls_in_order(heap):
-    assert_measured_as_told(small_case(), heap)
+    assert_measured_as_declared(small_case(), heap)
     seen = heap.observables
     assert 0.0 < seen["t75"] < seen["t55"] < seen["time_to_rest"]
 
@@ -137,23 +130,23 @@ def test_grains_that_all_leave_are_no_heap_and_have_no_centre():
     [result] = simulate([case], device="cpu", workers=1)
     assert result.status == "failed"
     assert "no grain is left on the plate" in result.reason
-    assert_measured_as_told(case, result, absent=frozenset({"centre_height"}))
+    assert_measured_as_declared(case, result, absent=frozenset({"centre_height"}))
     assert result.observables["rolled_fraction"] == 1.0
 
 
 def test_a_bed_that_stays_has_no_times_of_falling():
     case = small_case(scene=replace(SMALL_TUBE, grain_count=1))
-    assert_measured_as_told(case, simulated(case), absent=frozenset({"t75", "t55"}))
+    assert_measured_as_declared(case, simulated(case), absent=frozenset({"t75", "t55"}))
 
 
 FALL_TIME = 0.3137
-"""In which the layer of `fallen` would come down to the plate [s]."""
+"""Time in which the layer of `fallen` would come down to the plate [s]."""
 
 
 def fallen(given: Callable[[float], float]) -> dict[str, float]:
-    """Observables of a layer that falls evenly in the tube until it is below 55 %.
+    """Observe a layer that falls evenly in the tube until it is below 55 %.
 
-    It has given so much to the tube by a time since the start [weight s]; grains outside have no part in it.
+    `given` is its impulse on the tube until a time [weight s]; grains outside have no part in it.
     """
     height, case = 0.8 * SMALL_TUBE.height, small_case()
     [setup] = case.scene.prepare([case], resolve_device("cpu"))
@@ -191,5 +184,5 @@ def test_a_surface_that_falls_evenly_is_timed_between_two_looks():
 def test_a_load_that_swings_between_two_looks_counts_by_its_mean():
     swing = 2.0 * math.pi * 500.0  # several times within a look
     seen = fallen(lambda time: 7.0 + 0.3 * time + 0.3 * (1.0 - math.cos(swing * time)) / swing)
-    # What of a swing the last two looks cut off, over the time to t75.
+    # The part of a swing that the last two looks cut off, over the time to t75.
     assert seen["wall_drag"] == pytest.approx(0.3, abs=0.3 * 2.0 / swing / (0.25 * FALL_TIME))

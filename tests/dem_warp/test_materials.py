@@ -46,9 +46,7 @@ def test_damping_grows_as_restitution_falls_and_stays_below_its_limit():
     [
         ((0.0, 1e6, 0.3), "density: must be positive and finite"),
         ((698.0, -1.0, 0.3), "shear_modulus: must be positive and finite"),
-        ((698.0, math.nan, 0.3), "shear_modulus: must be positive and finite"),
         ((698.0, 1e6, 0.51), "Material.poisson_ratio: must be at most 0.5, got 0.51"),
-        ((698.0, 1e6, math.nan), "poisson_ratio: must be above -1"),
     ],
 )
 def test_a_material_refuses_values_out_of_range(values, message):
@@ -61,7 +59,6 @@ def test_a_material_refuses_values_out_of_range(values, message):
     [
         ((0.0, 0.5, 0.05), "Interaction.restitution: must be positive and finite, got 0.0"),
         ((1.01, 0.5, 0.05), "Interaction.restitution: must be at most 1, got 1.01"),
-        ((0.5, -0.1, 0.05), "static_friction: must be finite and 0 or more, got -0.1"),
         ((0.5, 0.5, math.inf), "rolling_friction: must be finite and 0 or more, got inf"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Walls of triangles: a contact wherever the surface comes nearest to a sphere, and no trace of the seams."""
+"""Walls of triangles: one contact at the nearest point of the surface, and no trace of the seams."""
 
 import math
 from dataclasses import replace
@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from worlds import (
-    GRAIN,
     GRAVITY,
     RADIUS,
+    TIME_STEP,
     assert_same_bits,
     ball_mass,
     downhill,
     grains,
     pair,
     run_for,
+    settle,
     solve,
     state,
     static_overlap,
@@ -23,12 +24,10 @@ from worlds import (
 )
 
 from dem_warp.entries import max_partners
-from dem_warp.materials import rayleigh_time
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.triangles import TriangleTable
 from dem_warp.walls import Mesh, Motion, Plane
 
-TIME_STEP = 0.25 * rayleigh_time(RADIUS, GRAIN)
 CONTACT = pair(restitution=0.1)
 OVERLAP = static_overlap(CONTACT, ball_mass() * GRAVITY)
 SLANT = math.sqrt(0.5)
@@ -43,7 +42,7 @@ BOX = Mesh((CORNERS - 0.5) * EDGE, SIDES)
 
 
 def plate(cells: int, half: float = 0.06, shift: float = 0.0) -> Mesh:
-    """Square plate z = 0 of triangles, its inner vertices moved aside by some part of a cell."""
+    """Return a square plate z = 0 of triangles, its inner vertices moved aside by some part of a cell."""
     rng = np.random.default_rng(cells)
     axis = np.linspace(-half, half, cells + 1)
     x, y = np.meshgrid(axis, axis, indexing="ij")
@@ -56,32 +55,18 @@ def plate(cells: int, half: float = 0.06, shift: float = 0.0) -> Mesh:
     return Mesh(np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)]), faces)
 
 
-def settle(wall, place, down, time=0.06):
-    """Resting place of a ball on a wall that lies `down` from it."""
-    gravity = tuple(GRAVITY * np.asarray(down, dtype=float))
-    solver = solve(world(grains(place), CONTACT, TIME_STEP, walls=(wall,), gravity=gravity))
-    run_for(solver, time)
-    end = state(solver)
-    assert np.abs(end["velocities"]).max() < 1e-9
-    return end["positions"][0]
-
-
 @pytest.mark.parametrize(
     ("mesh", "nearest", "outward"),
     [
-        pytest.param(BOX, (0.01, 0.005, 0.02), (0.0, 0.0, 1.0), id="on a face"),
         pytest.param(BOX, (0.01, 0.01, 0.02), (0.0, 0.0, 1.0), id="on a flat seam"),
-        pytest.param(BOX, (0.01, 0.005, 0.02), (0.0, 0.0, -1.0), id="inside, under a face"),
-        pytest.param(BOX, (0.01, 0.02, 0.02), (0.0, SLANT, SLANT), id="on an edge"),
         pytest.param(BOX, (0.01, 0.02, 0.02), (0.0, 0.28, 0.96), id="on an edge, nearly on a face"),
         pytest.param(BOX, (-0.02, 0.02, 0.02), (-1 / 3, 2 / 3, 2 / 3), id="on a corner"),
         pytest.param(plate(2), (0.06, 0.01, 0.0), (0.8, 0.0, -0.6), id="on a free edge"),
-        pytest.param(plate(2), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), id="on a vertex of a flat plate"),
         pytest.param(plate(7, shift=0.3), (0.001, -0.003, 0.0), (0.0, 0.0, -1.0), id="under a plate"),
     ],
 )
 def test_a_ball_rests_on_every_part_of_a_mesh(mesh, nearest, outward):
-    end = settle(mesh, np.add(nearest, np.multiply(RADIUS, outward)), np.negative(outward))
+    end = settle(CONTACT, mesh, np.add(nearest, np.multiply(RADIUS, outward)), np.negative(outward))
     np.testing.assert_allclose(
         end, np.add(nearest, np.multiply(RADIUS - OVERLAP, outward)), rtol=0.0, atol=1e-6 * OVERLAP
     )
@@ -91,13 +76,13 @@ def test_a_ball_in_a_groove_touches_both_sides():
     # A right-angled groove along x: each side carries m g / sqrt(2).
     vertices = [[x, y, abs(y)] for x in (-0.05, 0.05) for y in (-0.03, 0.0, 0.03)]
     groove = Mesh(vertices, [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]])
-    end = settle(groove, [0.0, 0.0, RADIUS / SLANT], [0.0, 0.0, -1.0])
+    end = settle(CONTACT, groove, [0.0, 0.0, RADIUS / SLANT], [0.0, 0.0, -1.0])
     overlap = static_overlap(CONTACT, ball_mass() * GRAVITY * SLANT)
     np.testing.assert_allclose(end, [0.0, 0.0, (RADIUS - overlap) / SLANT], rtol=0.0, atol=1e-6 * OVERLAP)
 
 
 def around_box() -> np.ndarray:
-    """Places within a ball's reach and beyond, (n, 3): scattered, and in line with all symmetries."""
+    """Return places within a ball's reach and beyond, (n, 3): scattered, and in line with all symmetries."""
     rng = np.random.default_rng(1)
     half, out = 0.5 * EDGE, 0.5 * EDGE + 0.9 * RADIUS
     scattered = rng.uniform(-half - RADIUS, half + RADIUS, (400, 3))
@@ -108,9 +93,8 @@ def around_box() -> np.ndarray:
     return places[(np.abs(places) > half).any(axis=1)]
 
 
-@pytest.mark.parametrize("turned", [False, True])
-def test_a_ball_anywhere_about_a_box_has_one_contact_with_its_nearest_point(turned):
-    turn = Rotation.from_rotvec([0.3, -0.5, 0.9]) if turned else Rotation.identity()
+def test_a_ball_anywhere_about_a_turned_box_has_one_contact_with_its_nearest_point():
+    turn = Rotation.from_rotvec([0.3, -0.5, 0.9])
     box = Mesh(turn.apply(np.array(BOX.vertices)), BOX.faces)
     places = around_box()
     contact = pair()
@@ -130,9 +114,7 @@ def test_a_ball_anywhere_about_a_box_has_one_contact_with_its_nearest_point(turn
 @pytest.mark.parametrize(
     ("mesh", "place", "velocity"),
     [
-        pytest.param(plate(1), (-0.03, 0.01, 0.0), (0.6, -0.2, 0.0), id="over the one seam"),
         pytest.param(plate(1), (-0.03, -0.03, 0.0), (0.4, 0.4, 0.0), id="along the seam"),
-        pytest.param(plate(12), (-0.03, 0.0, 0.0), (0.6, 0.0, 0.0), id="along seams, over vertices"),
         pytest.param(plate(25, shift=0.35), (-0.03, 0.002, 0.0), (0.6, 0.03, 0.0), id="over many"),
     ],
 )
@@ -153,33 +135,6 @@ def test_a_plate_of_triangles_is_a_plane(mesh, place, velocity):
         np.testing.assert_allclose(ends[1][name], ends[0][name], rtol=0.0, atol=1e-9 * size, err_msg=name)
 
 
-def test_a_ball_keeps_its_energy_between_walls_of_triangles():
-    # Frictionless and elastic, around a box within a tube of eleven flat sides.
-    velocity = np.array([0.1, 0.9, 0.04])
-    tube = Mesh.tube(0.06, 0.1, 11)
-    tube = Mesh(tube.vertices - np.array([0.0, 0.0, 0.05]), tube.faces)
-    ball = grains([0.03, 0.0, 0.0], velocities=velocity)
-    solver = solve(world(ball, pair(), 0.25 * TIME_STEP, walls=(tube, BOX)))
-    seen = []
-    for _ in range(200):
-        solver.advance(1)
-        seen.append(state(solver)["velocities"][0])
-    bounces = np.count_nonzero(np.abs(np.diff(seen, axis=0)).max(axis=1) > 1e-6)
-    assert bounces >= 10
-    # Seen in flight as a rule. An impact of 68 steps returns the energy to 1 / 68^2 = 2e-4; the signs differ.
-    assert np.median(np.linalg.norm(seen[-20:], axis=1)) == pytest.approx(np.linalg.norm(velocity), rel=2e-4)
-
-
-def test_a_tube_has_the_cross_section_of_a_round_one():
-    tube = Mesh.tube(0.02, 0.05, 9)
-    x, y = tube.vertices[:9, :2].T
-    area = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
-    assert area == pytest.approx(math.pi * 0.02**2, rel=1e-12)
-    side = tube.vertices[tube.faces]
-    areas = 0.5 * np.linalg.norm(np.cross(side[:, 1] - side[:, 0], side[:, 2] - side[:, 0]), axis=1)
-    assert areas.sum() == pytest.approx(9 * 0.05 * np.hypot(x[1] - x[0], y[1] - y[0]), rel=1e-12)
-
-
 def test_neighbours_of_a_triangle_are_those_that_share_corners():
     table = TriangleTable.of(BOX)
     for i, mine in enumerate(table.corners):
@@ -194,7 +149,6 @@ def test_neighbours_of_a_triangle_are_those_that_share_corners():
 
 
 def heap_in(mesh: Mesh, seed: int):
-    """A dozen balls that fall on a mesh."""
     rng = np.random.default_rng(seed)
     places = [[0.012 * x, 0.012 * y, 0.03 + 0.012 * z] for x in (-1, 1) for y in (-1, 1) for z in range(3)]
     bodies = grains(places + rng.uniform(-1e-3, 1e-3, (12, 3)), velocities=[0.0, 0.0, -0.3])
@@ -206,13 +160,13 @@ def test_worlds_of_a_batch_have_meshes_of_their_own():
     setups = [heap_in(Mesh.tube(0.0245, 0.06, 12), 1), heap_in(BOX, 2), heap_in(plate(9, shift=0.2), 3)]
     together = solve(*setups)
     together.move_wall(1, 0, Motion(spin=(0.0, 0.0, 4.0)))
-    run_for(together, 0.1)
+    run_for(together, 0.06)
     assert together.flags.numpy().tolist() == [0, 0, 0]
     for w, setup in enumerate(setups):
         alone = solve(setup)
         if w == 1:
             alone.move_wall(0, 0, Motion(spin=(0.0, 0.0, 4.0)))
-        run_for(alone, 0.1)
+        run_for(alone, 0.06)
         assert_same_bits(state(together, w), state(alone))
         listed = alone.neighbours.entry.numpy() % max_partners(alone.layout.sphere_count)
         assert (listed >= 12 + 2).any()
@@ -243,9 +197,7 @@ def test_worlds_with_and_without_meshes_run_apart():
     ("vertices", "faces", "message"),
     [
         (np.zeros((3, 2)), [[0, 1, 2]], r"Mesh.vertices: must be finite, shape \(n, 3\) .* \(3, 2\)"),
-        (np.full((3, 3), np.nan), [[0, 1, 2]], "Mesh.vertices: must be finite"),
         (CORNERS, [[0, 1]], r"Mesh.faces: must be integers, shape \(m, 3\), got int64 of shape \(1, 2\)"),
-        (CORNERS, [[0.0, 1.0, 2.0]], "Mesh.faces: must be integers, .* got float64"),
         (CORNERS, [[0, 1, 2], [0, 1, 8]], r"from 0 to 7, got others in triangles \[1\]"),
         (CORNERS, [[0, 1, 2], [0, 0, 3]], r"must have an area, got triangles \[1\] without"),
     ],

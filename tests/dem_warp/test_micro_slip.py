@@ -37,7 +37,7 @@ def lead(
 
 
 def forces(overlaps: Any, places: Any, friction: float = 1.0) -> np.ndarray:
-    """Tangential force after each step of a contact led through overlaps (n,) and places (n, 2).
+    """Return the tangential force after each step of a contact led through overlaps (n,) and places (n, 2).
 
     Friction is over a normal force of overlap^(3/2). It begins at the first place without a force.
     """
@@ -59,17 +59,16 @@ def forces(overlaps: Any, places: Any, friction: float = 1.0) -> np.ndarray:
 
 
 def along(x: Any) -> np.ndarray:
-    """Places on a line."""
     return np.column_stack([x, np.zeros_like(x)])
 
 
 def pressed(steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Overlaps of a contact that is pressed to 1 from a hundredth without moving, and its places so far."""
+    """Return overlaps of a contact that is pressed from a hundredth to 1 without moving, and its places."""
     return np.linspace(0.01, 1.0, steps), np.zeros(steps)
 
 
 def cattaneo(force: np.ndarray) -> np.ndarray:
-    """Displacement at a force over the limit, of a contact of overlap 1: Johnson (1985), equation 7.42."""
+    """Return the displacement at a force over the limit, at overlap 1: Johnson (1985), equation 7.42."""
     return 1.5 / STIFFNESS * (1.0 - (1.0 - force) ** (2.0 / 3.0))
 
 
@@ -100,18 +99,9 @@ def test_nothing_slips_while_both_forces_grow_and_fall_together():
     overlaps = np.concatenate([half, half[::-1]])
     force = -forces(overlaps, along(ratio * overlaps))[:, 0]
     want = 2.0 / 3.0 * STIFFNESS * ratio * overlaps**1.5
-    # On the way back the spring at the rim lets go of its mean force where theory lets go of none: up to
+    # On the way back the spring at the rim lets go of its mean force, unlike in theory: up to
     # (3/8) h^2 of the largest force, the width h of a spring being 0.16. A step adds half its change.
     np.testing.assert_allclose(force, want, atol=(0.375 * 0.16**2 + 0.0012) * want.max())
-
-
-def test_pressing_a_contact_changes_no_tangential_force():
-    overlaps = np.concatenate([[1e-6, 1e-6], np.geomspace(1e-6, 1.0, 300)])
-    places = along(np.where(np.arange(302) > 0, 1e-7, 0.0))
-    force = forces(overlaps, places)
-    assert force[1, 0] < 0.0
-    # Some thousand sums of two springs and of the row, each rounded by 1e-16.
-    np.testing.assert_allclose(force[1:], np.broadcast_to(force[1], force[1:].shape), rtol=1e-12)
 
 
 def test_gross_slip_is_coulombs_and_turns_with_the_motion():
@@ -141,7 +131,6 @@ def test_no_direction_is_special():
     np.testing.assert_allclose(forces(overlaps, places @ turn), forces(overlaps, places) @ turn, atol=1e-12)
 
 
-@pytest.mark.parametrize("value", [0.5, 2.0, -1.0])
-def test_it_is_there_or_not(value):
-    with pytest.raises(ValueError, match=rf"MicroSlip.micro_slip: must be .* got {value}"):
-        MicroSlip(micro_slip=value)
+def test_half_a_micro_slip_is_refused():
+    with pytest.raises(ValueError, match=r"MicroSlip.micro_slip: must be .* got 0.5"):
+        MicroSlip(micro_slip=0.5)

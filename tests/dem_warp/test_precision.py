@@ -15,7 +15,7 @@ HISTORY_STEPS = [0, 1, 255, 2**23, 2**24 + 1, 2**31 - 1]
 
 
 def packing_kernel(precision):
-    """Kernel that packs positions, takes their difference, and stamps a step on a displacement."""
+    """Return a kernel that packs positions, takes their difference, and stamps a step on a displacement."""
     pack, types = packing(precision), device_structs(precision)
     real, vec3 = precision.real, precision.vec3
 
@@ -43,7 +43,7 @@ def packing_kernel(precision):
 
 
 def probe(precision, a: np.ndarray, b: np.ndarray) -> dict[str, np.ndarray]:
-    """Positions `a` and `b` [m], (n, 3), after the packing of a world about (0.1, 0.2, 0.3)."""
+    """Return positions `a` and `b` [m], (n, 3), after the packing of a world about (0.1, 0.2, 0.3)."""
     device = resolve_device("cpu")
     rows = [{"unit": UNIT if precision.is_fixed_point else 1.0, "origin": (0.1, 0.2, 0.3)}]
     worlds = struct_array(device_structs(precision).World, rows, device)
@@ -62,7 +62,7 @@ def probe(precision, a: np.ndarray, b: np.ndarray) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def scattered():
-    """Positions all over a box of 0.08 m half width, and others within 0.5 mm of them."""
+    """Return positions all over a box of 0.08 m half width, and others within 0.5 mm of them."""
     rng = np.random.default_rng(3)
     a = rng.uniform(-0.08, 0.08, (500, 3)) + np.array([0.1, 0.2, 0.3])
     return a, a + rng.uniform(-0.5e-3, 0.5e-3, a.shape)
@@ -89,7 +89,6 @@ def test_radii_and_steps_come_back_as_they_were_packed(scattered, precision):
 
 
 def oblique(precision: str, place=(0.0, 0.0, 0.0)):
-    """Record of an oblique impact."""
     return record(solve(oblique_impact(place), precision=precision), 400)
 
 

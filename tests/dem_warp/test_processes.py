@@ -5,38 +5,42 @@ import os
 import signal
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
-from worlds import assert_same_result, small_case
+from worlds import SMALL_TUBE, assert_same_result, small_case
 
-from dem_warp import Processes, Progress, simulate
+from dem_warp import CaseResult, Processes, Progress, simulate
 from dem_warp.batch import Batch
 
-CASES = [small_case(seed=seed) for seed in (1, 2, 3)]
+CASES = [small_case(seed, replace(SMALL_TUBE, grain_count=4)) for seed in (1, 2, 3)]
+
+
+@pytest.fixture(scope="module")
+def alone() -> list[CaseResult]:
+    """Return the results of the cases, each simulated by itself in this process."""
+    return [simulate([case], "cpu", 1)[0] for case in CASES]
 
 
 @dataclass(frozen=True)
 class Signature:
-    """Leaves a file with the number of each process that simulates."""
+    """Callback that leaves a file with the number of each process that simulates."""
 
     folder: Path
 
     def __call__(self, batch: Batch) -> None:
-        """Leave the file."""
         (self.folder / str(os.getpid())).touch()
 
 
 @dataclass(frozen=True)
 class Loss:
-    """Kills the simulating process the first n times."""
+    """Callback that kills the simulating process the first n times."""
 
     folder: Path
     times: int
 
     def __call__(self, batch: Batch) -> None:
-        """Kill it, and leave a file."""
         for number in range(self.times):
             with suppress(FileExistsError):
                 (self.folder / str(number)).touch(exist_ok=False)
@@ -44,7 +48,6 @@ class Loss:
 
 
 def signed(folder: Path, processes: Processes) -> set[str]:
-    """Numbers of the processes that simulate the cases."""
     folder.mkdir()
     simulate(CASES, "cpu", processes, on_advance=Signature(folder))
     return {path.name for path in folder.iterdir()}
@@ -59,17 +62,15 @@ def test_processes_stay_from_call_to_call_and_end_with_their_block(tmp_path: Pat
     assert multiprocessing.active_children() == before
 
 
-def test_a_case_has_the_same_bits_whatever_its_process_has_simulated_before() -> None:
-    alone = [simulate([case], "cpu", 1)[0] for case in CASES]
+def test_a_case_has_the_same_bits_in_a_process_that_has_simulated_others(alone: list[CaseResult]) -> None:
     with Processes(2) as processes:
         simulate(CASES[:2], "cpu", processes)
         for one, other in zip(alone, simulate(CASES[::-1], "cpu", processes)[::-1], strict=True):
             assert_same_result(one, other)
 
 
-def test_the_cases_of_a_lost_process_go_on_in_another_one(tmp_path: Path) -> None:
+def test_the_cases_of_a_lost_process_go_on_in_another_one(alone: list[CaseResult], tmp_path: Path) -> None:
     ended: list[int] = []
-    alone = [simulate([case], "cpu", 1)[0] for case in CASES]
     found = simulate(CASES, "cpu", 2, lambda index, _: ended.append(index), on_advance=Loss(tmp_path, 2))
     assert sorted(ended) == [0, 1, 2]
     for one, other in zip(alone, found, strict=True):
@@ -97,7 +98,7 @@ def test_a_process_that_is_lost_between_two_calls_is_replaced_and_others_are_lef
     other.join()
 
 
-def test_each_call_tells_of_its_own_progress() -> None:
+def test_each_call_reports_its_own_progress() -> None:
     seen: list[Progress] = []
     with Processes(2) as processes:
         for _ in range(2):

@@ -1,4 +1,4 @@
-"""Cases that cannot be, and checkpoints that were forged: each ends with its reason, and harms no other."""
+"""Impossible cases and forged checkpoints: each ends with its reason, and harms no other."""
 
 import io
 import json
@@ -37,26 +37,17 @@ IMPOSSIBLE = {
 }
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_case_that_cannot_be_fails_alone(alone, workers):
+def test_a_case_that_cannot_be_fails_alone(alone):
     cases = [few(), *(case for case, _ in IMPOSSIBLE.values())]
-    [whole, *others] = simulate(cases, device="cpu", workers=workers)
+    [whole, *others] = simulate(cases, device="cpu", workers=2)
     assert_same_result(whole, alone)
     for result, (name, (_, reason)) in zip(others, IMPOSSIBLE.items(), strict=True):
         assert result.status == "failed", name
         assert reason in result.reason
 
 
-def test_a_plate_that_all_grains_leave_has_no_heap():
-    grainless = few(tilt=math.radians(60.0), plate_diameter=0.02)
-    [result] = simulate([grainless], device="cpu", workers=1)
-    assert (result.status, len(result.positions)) == ("failed", 0)
-    assert "no grain is left on the plate" in result.reason
-
-
 @pytest.fixture(scope="module")
 def halfway():
-    """A batch half-way."""
     batch = Batch([few()], "cpu")
     for _ in range(3):
         batch.advance()
@@ -65,12 +56,12 @@ def halfway():
 
 @pytest.fixture
 def kept(halfway, tmp_path):
-    """A batch half-way, and a folder for its checkpoint."""
+    """Return a batch half-way, and a folder for its checkpoint."""
     return halfway, Checkpoints(tmp_path)
 
 
 def assert_not_used(checkpoints, caplog):
-    """A batch begins as without a checkpoint, and warns."""
+    """Require that a batch begins as without a checkpoint, and warns."""
     begun, fresh = Batch([few()], "cpu", checkpoints), Batch([few()], "cpu")
     assert "starts again" in caplog.text
     assert begun.steps == [0]
@@ -99,17 +90,12 @@ def put_field(name, value):
     ("name", "change"),
     [
         (ENTRY, put(-1)),
-        (ENTRY, put(2**23 - 1)),
         (ENTRY, put(2**31 - 1)),
-        (COUNT, put(-1)),
         (COUNT, put(10**6)),
-        (STEP, put(-256)),
         (STEP, put(255)),
         ("grains.position", put(np.nan)),
-        ("grains.velocity", put(np.inf)),
         ("neighbours.history", put(np.nan)),
         ("world.walls", put_field("pair", 99)),
-        ("world.walls", put_field("kind", 3)),
     ],
 )
 def test_a_forged_checkpoint_is_not_used(kept, caplog, name, change):
@@ -118,9 +104,8 @@ def test_a_forged_checkpoint_is_not_used(kept, caplog, name, change):
 
 @pytest.mark.parametrize(
     "change",
-    [{"phase": "elsewhere"}, {"phase": 3}, {"surface": ["high"]}, {"observables": []}, {"mass": math.nan},
-     {"more": 1}],
-)  # fmt: skip
+    [{"phase": "elsewhere"}, {"surface": ["high"]}, {"mass": math.nan}, {"more": 1}],
+)
 def test_a_forged_state_is_not_used(kept, caplog, change):
     batch, checkpoints = kept
     state = asdict(batch.controllers[0].state) | change

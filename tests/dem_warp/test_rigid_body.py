@@ -13,20 +13,19 @@ TUMBLE_STEP = 1e-5
 
 
 def spin_momentum(setup, poses) -> np.ndarray:
-    """Angular momentum of each grain about its own centre [kg m2/s], (n, 3)."""
+    """Return angular momentum of each grain about its own centre [kg m2/s], (n, 3)."""
     turns = [Rotation.from_quat(q).as_matrix() for q in poses["orientations"]]
     inertia = setup.inertias[poses["slots"]]
     return np.array([r @ (i * (r.T @ s)) for r, i, s in zip(turns, inertia, poses["spins"], strict=True)])
 
 
 def tumbling(time_step: float):
-    """A free boot that turns about its unstable axis."""
     bodies = grains([0.0, 0.0, 0.0], spins=SPIN, shapes=1)
     return world(bodies, pair(), time_step, shapes=(PYRAMID, BOOT))
 
 
 def drift(time_step: float, chunks: int, precision: str = "double") -> tuple[float, float]:
-    """Relative changes of angular momentum and of rotation energy of the free boot."""
+    """Return relative changes of angular momentum and of rotation energy of the free boot."""
     setup = tumbling(time_step)
     solver = solve(setup, precision=precision)
     momentum = [spin_momentum(setup, state(solver))]

@@ -1,4 +1,4 @@
-"""The surface of a bed, as scenes see it: on drawn beds whose level and slopes are known."""
+"""Level and slopes of beds: on drawn beds whose surface is known."""
 
 import math
 
@@ -12,7 +12,7 @@ REACH = 1e-3
 
 
 def lattice(inside) -> np.ndarray:
-    """Places of a cubic lattice, far finer than a grain, that lie in a region [m]."""
+    """Return places of a cubic lattice, far finer than a grain, that lie in a region [m]."""
     axis = np.arange(-0.03, 0.03, 0.25 * REACH)
     x, z = (grid.ravel() for grid in np.meshgrid(axis, axis))
     kept = inside(x, z)
@@ -40,7 +40,7 @@ def test_a_profile_averages_the_highest_centres_along_y():
     assert z.tolist() == [-1.0, 6.0]
 
 
-@pytest.mark.parametrize("degrees", [5.0, 30.0, 60.0])
+@pytest.mark.parametrize("degrees", [5.0, 60.0])
 def test_a_flank_is_measured_without_its_foot_and_its_flat_top(degrees):
     rise = math.tan(math.radians(degrees))
     x = np.arange(40.0)
@@ -60,21 +60,6 @@ def test_no_flank_is_seen_where_there_is_none():
     assert flank_angle(x, 9.0 * (x > 4.0), 1.0) is None
 
 
-@pytest.mark.parametrize("degrees", [0.0, 25.0, 65.0])
-def test_a_flat_bed_in_a_drum_has_its_tilt_for_every_angle(degrees):
-    radius, depth, tilt = 0.025, 0.015, math.radians(degrees)
-
-    def inside(x, z):
-        below = x * math.sin(tilt) + z * math.cos(tilt) < depth - radius
-        return below & (x**2 + z**2 < radius**2)
-
-    half_chord = math.sqrt(radius**2 - (radius - depth) ** 2)
-    angles = surface_angles(lattice(inside), half_chord, REACH)
-    # The lattice's step is an eighth of a column: heights are off by at most that, 0.25 mm, over half of the
-    # surface, 18 mm. A line weighs them so that this is 1.2 degrees at the very most.
-    np.testing.assert_allclose(angles, degrees, atol=1.2)
-
-
 def test_a_bed_that_is_steep_above_and_flat_below_has_two_angles():
     radius, upper, lower = 0.025, math.radians(45.0), math.radians(25.0)
     # The bend is in the middle of the chord of a bed that is tilted by the mean of both.
@@ -85,7 +70,8 @@ def test_a_bed_that_is_steep_above_and_flat_below_has_two_angles():
         return (z < surface) & (x**2 + z**2 < radius**2)
 
     angles = surface_angles(lattice(inside), 0.02, REACH)
-    # As for the flat bed, and a column next to the bend may hold a little of the other slope.
+    # The lattice's step is an eighth of a column: heights are off by at most that, 0.25 mm, which is 1.2
+    # degrees of a line at most; a column next to the bend may hold a little of the other slope.
     assert angles.upper_angle == pytest.approx(45.0, abs=2.0)
     assert angles.lower_angle == pytest.approx(25.0, abs=2.0)
     assert angles.dynamic_angle == pytest.approx(35.0, abs=2.0)

@@ -1,7 +1,7 @@
 """Builders of small worlds, closed forms of their contacts, and a step-by-step record of their motion.
 
-Every world but those of some scenes has two walls, far-off planes where a test needs none, and its grains
-have one sphere or nine: so all tests together compile few builds of the kernels.
+Every world, except those of some scenes, has two walls, far-off planes where a test needs no wall, and grains
+of one sphere or of nine, so that all tests together compile few builds of the kernels.
 """
 
 import math
@@ -57,7 +57,7 @@ PYRAMID = ClumpShape.from_spheres(
     ),
     1e-3 * np.array([0.85] * 6 + [1.0, 0.8, 0.6]),
 )
-"""Nine spheres that stand on three of them, like a buckwheat grain of 6 mm."""
+"""Nine spheres with three feet, like a buckwheat grain of 6 mm."""
 
 BOOT = ClumpShape.from_spheres(
     1e-3 * np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.2, 0.0]]), 1e-3 * np.array([1.0, 0.8, 0.6])
@@ -79,7 +79,7 @@ def grains(
     shapes: ArrayLike = 0,
     density: float = GRAIN.density,
 ) -> Grains:
-    """Grains at positions [m]; what is given once holds for all of them."""
+    """Return grains at positions [m]; a value given once holds for all of them."""
     positions = np.atleast_2d(np.asarray(positions, dtype=float))
     n = len(positions)
     return Grains(
@@ -103,7 +103,7 @@ def pair(
     mechanisms: tuple[Mechanism, ...] = (),
     laws: ContactLaws = EDEM,
 ) -> ContactCoefficients:
-    """Contact of the grains' material with a partner's; reduced radius and mass are those on a wall."""
+    """Return the contact of the grains' material with another, with reduced radius and mass on a wall."""
     interaction = Interaction(restitution, friction, rolling)
     laws = replace(laws, attraction="clamped") if clamp else laws
     return ContactCoefficients.of_pair(GRAIN, partner, interaction, laws, mechanisms, RADIUS, ball_mass())
@@ -123,7 +123,7 @@ def world(
     weighed: int | None = 0,
     laws: ContactLaws = EDEM,
 ) -> WorldSetup:
-    """A world in which one contact holds for grains and walls alike, its walls made up to two."""
+    """Build a world in which one contact holds for grains and walls alike, with at least two walls."""
     both = (*walls, *[_NOWHERE] * (2 - len(walls)))
     return WorldSetup(
         grains=bodies,
@@ -142,18 +142,29 @@ def world(
 
 
 def downhill(degrees: float) -> tuple[float, float, float]:
-    """Gravity [m/s2] over a plane z = 0 that falls towards +y by an angle."""
+    """Return the gravity [m/s2] over a plane z = 0 that falls towards +y by an angle."""
     angle = math.radians(degrees)
     return 0.0, GRAVITY * math.sin(angle), -GRAVITY * math.cos(angle)
 
 
 def ball_mass() -> float:
-    """Mass of a single sphere [kg]."""
     return GRAIN.density * BALL.volume
 
 
+def settle(
+    contact: ContactCoefficients, wall: Wall, place: ArrayLike, down: ArrayLike, time: float = 0.06
+) -> np.ndarray:
+    """Return the resting place of a ball on a wall that is `down` from it [m]."""
+    gravity = tuple(GRAVITY * np.asarray(down, dtype=float))
+    solver = solve(world(grains(place), contact, TIME_STEP, walls=(wall,), gravity=gravity))
+    run_for(solver, time)
+    end = state(solver)
+    assert np.abs(end["velocities"]).max() < 1e-9
+    return end["positions"][0]
+
+
 def static_overlap(contact: ContactCoefficients, force: float, radius: float = RADIUS) -> float:
-    """Overlap [m] at which a Hertz contact carries a force [N]."""
+    """Return the overlap [m] at which a Hertz contact carries a force [N]."""
     return float((0.75 * force / (contact.modulus * math.sqrt(radius))) ** (2.0 / 3.0))
 
 
@@ -164,7 +175,6 @@ def ball_on_plane(
     spin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     laws: ContactLaws = EDEM,
 ) -> WorldSetup:
-    """A ball that stands on a plane under its own weight."""
     weight = ball_mass() * GRAVITY * math.cos(math.radians(slope))
     place = [0.0, 0.0, RADIUS - static_overlap(contact, weight)]
     bodies = grains(place, velocities=velocity, spins=spin)
@@ -181,7 +191,7 @@ class Impact:
 
     @classmethod
     def of(cls, contact: ContactCoefficients, radius: float, mass: float, speed: float) -> "Impact":
-        """Impact of an effective radius [m] and mass [kg] at a speed [m/s]."""
+        """Return the impact of an effective radius [m] and mass [kg] at a speed [m/s]."""
         overlap = (15.0 * mass * speed**2 / (16.0 * contact.modulus * math.sqrt(radius))) ** 0.4
         force = 4.0 / 3.0 * contact.modulus * math.sqrt(radius) * overlap**1.5
         return cls(overlap, force, HERTZ_DURATION * overlap / speed)
@@ -192,7 +202,7 @@ PILE_TUBE = Cylinder((0.0, 0.0, 0.0), 0.012, 0.1)
 
 
 def pile(seed: int = 1, count: int = 36, skin: float = 1e-3) -> WorldSetup:
-    """Nine-sphere grains in layers of a tube, a little above one another, that fall and settle."""
+    """Return nine-sphere grains in layers of a tube, a little above one another, that fall and settle."""
     rng = np.random.default_rng(seed)
     corners = 0.0045 * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
     number = np.arange(count)
@@ -214,7 +224,7 @@ def pile(seed: int = 1, count: int = 36, skin: float = 1e-3) -> WorldSetup:
 
 
 def oblique_impact(place: ArrayLike = (0.0, 0.0, 0.0)) -> WorldSetup:
-    """Two spinning balls that meet off-centre, with friction, at a place [m]; an impact lasts 100 steps."""
+    """Return two spinning balls that meet off-centre, with friction, at a place [m], for 100 steps."""
     contact = pair(restitution=0.5, friction=0.3, rolling=0.05)
     bodies = grains(
         np.add(place, [[0.0, 0.0, 0.0], [0.001, 0.002, 2.0 * RADIUS - 2.4e-4]]),
@@ -254,7 +264,7 @@ def record(solver: Solver, steps: int) -> Record:
 def solve(
     *setups: WorldSetup, precision: str = "double", device: str = DEVICE, capacity: int | None = None
 ) -> Solver:
-    """Solver of worlds on a device."""
+    """Return the solver of worlds on a device."""
     return Solver(setups, resolve_device(device), precision, capacity)
 
 
@@ -265,14 +275,14 @@ def run_for(solver: Solver, time: float) -> None:
 
 
 def state(solver: Solver, index: int = 0) -> dict[str, np.ndarray]:
-    """Copies of a world's final arrays: slots, poses, velocities and spins of its living grains."""
+    """Return copies of a world's final arrays: slots, poses, velocities and spins of its living grains."""
     return {name: np.array(array) for name, array in solver.poses(index).items()}
 
 
 def spheres_of(
     shape: ClumpShape, poses: dict[str, np.ndarray], sizes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (n * S, 3) and radii (n * S,) of grains of one shape [m]."""
+    """Return centres (n * S, 3) and radii (n * S,) of grains of one shape [m]."""
     turns = Rotation.from_quat(poses["orientations"]).as_matrix()
     local = shape.centers[None] * sizes[:, None, None]
     centers = poses["positions"][:, None] + np.einsum("nij,nsj->nsi", turns, local)
@@ -280,7 +290,7 @@ def spheres_of(
 
 
 def assert_same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None:
-    """Every array of two states is equal, bit for bit."""
+    """Require that every array of two states is equal, bit for bit."""
     assert a.keys() == b.keys()
     for name, array in a.items():
         np.testing.assert_array_equal(array, b[name], err_msg=name)
@@ -288,11 +298,11 @@ def assert_same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None
 
 RESULT_ARRAYS = ("positions", "orientations", "sizes", "sphere_centers", "sphere_radii", "sphere_grain")
 SPEED_ONLY = {"rebuilds"}
-"""Observables that tell of the work, not of the heap."""
+"""Observables of the work, not of the heap."""
 
 
 def assert_same_result(a: CaseResult, b: CaseResult) -> None:
-    """Two results are equal in all that the case determines."""
+    """Require that two results are equal in all that the case determines."""
     assert (a.status, a.reason, a.phases) == (b.status, b.reason, b.phases)
     for name in RESULT_ARRAYS:
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
@@ -303,23 +313,27 @@ def assert_same_result(a: CaseResult, b: CaseResult) -> None:
     assert kept[0] == kept[1]
 
 
-def run_batch(cases: Sequence[Case]) -> dict[int, CaseResult]:
-    """Results of cases that run in one launch on the CPU."""
-    batch, results = Batch(cases, resolve_device("cpu")), {}
+def finish(batch: Batch) -> dict[int, CaseResult]:
+    results = {}
     while batch.running:
         results.update(batch.advance())
     return results
 
 
-def assert_measured_as_told(case: Case, result: CaseResult, absent: frozenset[str] = frozenset()) -> None:
-    """A result has every observable that its scene tells of, but for some, and no other."""
+def run_batch(cases: Sequence[Case]) -> dict[int, CaseResult]:
+    """Return the results of cases that run in one launch on the CPU."""
+    return finish(Batch(cases, resolve_device("cpu")))
+
+
+def assert_measured_as_declared(case: Case, result: CaseResult, absent: frozenset[str] = frozenset()) -> None:
+    """Require every observable that the scene declares, except the absent ones, and no other."""
     declared = set(case.scene.observables)
     assert set(result.observables) == (declared - absent) | {"rebuilds"}
     assert absent <= declared
 
 
 def ball_case(scene: Scene, friction: float, rolling: float = 0.0, seed: int = 1) -> Case:
-    """Balls of 4 mm in a scene, so soft that a second takes 7,000 steps."""
+    """Return balls of 4 mm in a scene, so soft that a second takes 7,000 steps."""
     surfaces = Interaction(0.5, friction, rolling)
     return Case(
         scene=scene,
@@ -332,7 +346,7 @@ def ball_case(scene: Scene, friction: float, rolling: float = 0.0, seed: int = 1
 
 
 def small_case(seed: int = 1, scene: LiftedCylinder | None = None, **numerics: Any) -> Case:
-    """A lifted cylinder of some seventy nine-sphere grains: about a second on a core."""
+    """Return a lifted cylinder of about seventy nine-sphere grains: about a second on a core."""
     return Case(
         scene=scene or SMALL_TUBE,
         grains=GrainPopulation(PYRAMID, GRAIN),

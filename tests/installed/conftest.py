@@ -16,13 +16,13 @@ BUILT_FROM = (*PACKAGES, "pyproject.toml", "setup.py", "README.md", "LICENSE")
 
 @pytest.fixture(scope="session")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Wheel of this tree."""
+    """Build the wheel of this tree."""
     return build(ROOT, BUILT_FROM, tmp_path_factory.mktemp("build"))
 
 
 @pytest.fixture(scope="session")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
-    """The wheel, installed."""
+    """Install the wheel."""
     folder = tmp_path_factory.mktemp("installed")
     pip("install", wheel, "--target", folder / "site")
     (folder / "work").mkdir()

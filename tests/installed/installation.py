@@ -22,7 +22,7 @@ class Installed:
     work: Path
 
     def python(self, *arguments: object) -> str:
-        """Run Python with what is installed here, before what the environment has; return its output."""
+        """Run Python with these packages before those of the environment; return its output."""
         paths = os.pathsep.join(map(str, self.sites))
         return _output([sys.executable, *arguments], cwd=self.work, env=os.environ | {"PYTHONPATH": paths})
 
@@ -32,7 +32,7 @@ class Installed:
 
 
 def pip(*arguments: object) -> None:
-    """Run pip without a look at the network or at what else is installed."""
+    """Run pip without the network and without other packages."""
     _output([sys.executable, "-m", "pip", *arguments, "--no-deps", "--quiet", "--disable-pip-version-check"])
 
 

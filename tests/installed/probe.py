@@ -1,4 +1,4 @@
-"""Program for a fresh interpreter: all that an installed package adds, and what it leaves as it is.
+"""Program for a fresh interpreter: the additions of an installed package, and results without them.
 
 It prints one JSON object. Its argument is the folder of the tests of `dem_warp`, for worlds of two grains.
 """

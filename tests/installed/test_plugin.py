@@ -57,7 +57,7 @@ high = 0.6
 design = "corners"
 
 [campaign.selection]
-at_least = 1  # two corners leave nothing to tell an effect from noise by
+at_least = 1  # two corners have no noise to compare an effect with
 
 """
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
@@ -66,7 +66,7 @@ JAR = '[scene.jar]\ndiameter = "12 mm"\nheight = "20 mm"\ngrain_count = 10\n'
 
 @pytest.fixture(scope="module")
 def plugged(installed: Installed, tmp_path_factory: pytest.TempPathFactory) -> Installed:
-    """The wheel of this tree, and the package from outside."""
+    """Install the wheel of this tree and the package from outside."""
     folder = tmp_path_factory.mktemp("plugin")
     wheel = build(TESTS / "plugin", ("pyproject.toml", "grain_magnets"), folder)
     pip("install", wheel, "--target", folder / "site")
@@ -89,7 +89,7 @@ def together(plugged: Installed) -> dict[str, Any]:
     return probe(plugged)
 
 
-def test_what_a_package_adds_stands_after_what_was_there(
+def test_additions_of_a_package_follow_the_built_in_entries(
     alone: dict[str, Any], together: dict[str, Any]
 ) -> None:
     added = {
@@ -104,7 +104,7 @@ def test_what_a_package_adds_stands_after_what_was_there(
         assert together[kind] == [*alone[kind], name]
 
 
-def test_an_entry_that_cannot_be_used_is_named_and_hurts_no_other(together: dict[str, Any]) -> None:
+def test_an_entry_that_cannot_be_used_is_named_and_skipped(together: dict[str, Any]) -> None:
     missing, taken, unknown = together["warnings"]
     assert missing.startswith(
         "package grain-magnets, entry forgotten = grain_magnets.forgotten:Nothing of dem_"
@@ -115,12 +115,12 @@ def test_an_entry_that_cannot_be_used_is_named_and_hurts_no_other(together: dict
 
 
 def test_a_law_acts_in_a_contact_of_two_grains(together: dict[str, Any]) -> None:
-    """Its force is the mechanism's size, half a millinewton; a step's speed is rounded to 1e-13 of itself."""
+    # Its force is the mechanism's size, half a millinewton; a step's speed is rounded to 1e-13 of itself.
     assert together["force"] == pytest.approx(0.5e-3, rel=1e-12)
     assert together["accelerations"] == [pytest.approx(0.5e-3, rel=1e-9)]
 
 
-def test_cases_without_it_are_what_they_were(alone: dict[str, Any], together: dict[str, Any]) -> None:
+def test_cases_without_the_package_keep_their_keys(alone: dict[str, Any], together: dict[str, Any]) -> None:
     assert together["approach"] == alone["approach"] != 0.0
     assert together["key"] == alone["key"]
     assert together["keys by engine"] != [alone["key"]]

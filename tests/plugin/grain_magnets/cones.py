@@ -1,4 +1,4 @@
-"""An engine: it takes every heap for a smooth cone, the steeper the more friction."""
+"""An engine that returns a smooth cone for every case, steeper with more friction."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ RADIUS, BASE = 0.5e-3, 20e-3
 
 
 def simulate(cases: Sequence[Case], on_result: Any = None, **_: Any) -> list[CaseResult]:
-    """Cones of 15 degrees, 30 more for a friction of 1, and a little noise by the seed."""
+    """Return cones of 15 degrees, 30 more for a friction of 1, and a little noise by the seed."""
     results = []
     for index, case in enumerate(cases):
         noise = 0.3 * math.sin(12.9898 * case.seed)

@@ -9,7 +9,7 @@ from doe import Design, DesignError, Factor
 
 
 def corners(factors: Sequence[Factor], runs: int) -> Design:
-    """Full factorial of two levels."""
+    """Return the full factorial of two levels."""
     every = list(product((-1.0, 1.0), repeat=len(factors)))
     if runs % len(every):
         raise DesignError(f"corners: the runs must be a multiple of {len(every)}, got {runs}")

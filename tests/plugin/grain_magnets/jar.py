@@ -1,4 +1,4 @@
-"""A scene: a jar is filled, and that is all."""
+"""A scene: a jar is filled."""
 
 from dataclasses import dataclass
 from math import pi

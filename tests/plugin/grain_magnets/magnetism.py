@@ -1,4 +1,4 @@
-"""A law: grains that touch pull at each other with one force, however deep they overlap."""
+"""A law: grains that touch pull at each other with one force at any overlap."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -11,7 +11,7 @@ from dem_warp.parameters import Parameter
 
 @wp.func
 def constant_pull(params: Any, contact: Any, memory: Any, at: int):
-    """Attraction [N]."""
+    """Return the attraction [N]."""
     return params.magnetic_force
 
 
