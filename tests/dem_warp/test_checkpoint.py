@@ -247,7 +247,7 @@ def test_a_checkpoint_is_that_of_its_case_alone(left):
         assert start(other, folder=left["fill"]).steps == [0]
 
 
-def test_a_run_goes_on_where_no_checkpoint_can_be_written(tmp_path, caplog):
+def test_a_run_goes_on_if_no_checkpoint_can_be_written(tmp_path, caplog):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     batch = start(handful(1), folder=tmp_path / "file", every=ALWAYS)
     with caplog.at_level(logging.WARNING):
@@ -277,7 +277,7 @@ def test_a_snapshot_of_another_world_is_refused_and_changes_nothing():
         assert_same_bits(take_snapshot(solver, 0), untouched)
 
 
-def test_a_world_goes_on_in_the_rain_where_another_had_hardly_begun():
+def test_a_world_goes_on_in_the_rain_in_a_batch_at_its_start():
     case = small_case(scene=replace(SMALL_TUBE, grain_count=60, rain_rate=300.0))
     first, second = start(case), start(case)
     released = int(first.setups[0].grains.release_steps[20])

@@ -12,7 +12,7 @@ from dem_warp.solids import MESH_KINDS, parse_solid, read_mesh
 PERCENT = 0.01
 
 
-def test_a_sphere_is_filled_by_one_sphere_however_many_are_asked_for():
+def test_a_sphere_is_filled_by_one_sphere_of_three():
     fit = fit_clump(parse_solid("sphere:4"), 3)
     assert fit.shape.sphere_count == 1
     # The inscribed ball of the polyhedron is 0.1 % smaller, and the centre is found to a tenth of a sample.

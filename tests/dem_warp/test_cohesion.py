@@ -206,7 +206,7 @@ def hang(mechanism: Mechanism, overlap: float, most: float) -> np.ndarray:
     return overlaps[:-1]
 
 
-# Of the force: at rest the contact carries the weight; the damped oscillation has died out.
+# Tolerance over the force: at rest the contact carries the weight; the damped oscillation has died out.
 AT_REST = {"rtol": 0.0, "atol": 1e-9}
 
 
@@ -230,11 +230,11 @@ def test_a_ceiling_that_adheres_holds_a_grain_that_does_not_stick_to_another():
     run_for(solver, 0.05)
     upper, lower = state(solver)["positions"][:, 2]
     assert -RADIUS < upper < deepest - RADIUS
-    # A free fall of 0.05 s, from rest but for what the tiny first overlap gave.
+    # A free fall of 0.05 s, from rest except for the speed that the tiny first overlap gave.
     assert lower < upper - 2.0 * RADIUS - 0.4 * GRAVITY * 0.05**2
 
 
-def test_jkr_takes_from_an_impact_what_it_costs_to_part():
+def test_jkr_takes_the_work_of_separation_from_an_impact():
     radius, mass = effective_radius(1.0), ball_mass() / 2.0
     cost = math.pi * (2.0 * math.pi) ** (2.0 / 3.0) * (0.6 + 0.1 * 4.0 ** (-1.0 / 3.0))
     assert cost == pytest.approx(7.09, abs=0.005)

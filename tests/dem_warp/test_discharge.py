@@ -26,7 +26,7 @@ def runs() -> dict[float, CaseResult]:
 
 
 @pytest.mark.parametrize("outlet", [NARROW, WIDE])
-def test_what_was_filled_in_comes_out_or_stays(runs, outlet):
+def test_a_hopper_keeps_its_mass(runs, outlet):
     run, seen = runs[outlet], runs[outlet].observables
     assert (run.status, run.reason) == ("finished", "")
     assert [phase["name"] for phase in run.phases] == ["fill", "settle", "open", "discharge"]
@@ -44,7 +44,7 @@ def test_what_was_filled_in_comes_out_or_stays(runs, outlet):
 
 
 @pytest.mark.parametrize("outlet", [NARROW, WIDE])
-def test_what_stays_leaves_the_outlet_free(runs, outlet):
+def test_grains_that_stay_leave_the_outlet_free(runs, outlet):
     run = runs[outlet]
     from_axis = np.hypot(*run.positions.T[:2])
     assert len(run.positions) > 0
@@ -120,7 +120,7 @@ def drawn() -> list[CaseResult]:
     return [results[0], results[1]]
 
 
-def test_what_was_above_is_now_above_or_below(drawn):
+def test_a_draw_down_keeps_its_mass(drawn):
     run, seen = drawn[0], drawn[0].observables
     assert (run.status, run.reason) == ("finished", "")
     assert_measured_as_declared(draw_down_case(), run)

@@ -179,7 +179,7 @@ def test_a_camera_sees_the_highest_line_against_the_light_and_the_near_one_by_it
 
 
 def test_the_volume_below_a_bed_is_that_of_the_drum_below_its_plane():
-    # Half the drum, whatever the slope: within half a grain over the surface, 0.25 of 19.6 mm.
+    # Half the drum at any slope: within half a grain over the surface, 0.25 of 19.6 mm.
     half = math.pi / 2 * 0.025**2 * 0.018
     for tilt in (0.0, 30.0):
         assert bed_volume(slab(tilt), 0.025, 0.018, 5e-4) == pytest.approx(half, rel=0.05)

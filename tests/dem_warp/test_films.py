@@ -57,7 +57,7 @@ def test_a_probe_leaves_no_trace_in_contacts_with_a_memory() -> None:
     assert not solver.neighbours.reactions.torque.numpy().any()
 
 
-def test_what_contacts_bear_moves_the_grains() -> None:
+def test_contact_forces_accelerate_the_grains() -> None:
     setup = pile(count=12)
     solver = solve(setup)
     run_for(solver, 0.03)
@@ -124,7 +124,7 @@ def test_the_plate_bears_the_heap_at_rest(filmed: tuple[CaseResult, Film]) -> No
     last = film.frames[-1]
     on_plate = last.contacts.walls == film.wall_names.index("plate")
     weight = film.masses[last.grains].sum() * GRAVITY
-    # At rest: what speeds are left, below 1 cm/s, change by far less than a hundredth of the weight.
+    # At rest: the speeds that are left, below 1 cm/s, change by far less than a hundredth of the weight.
     assert last.contacts.forces[on_plate, 2].sum() == pytest.approx(weight, rel=0.01)
     assert on_plate.any()
     assert (last.contacts.points[on_plate, 2] < 0.0).all()

@@ -55,7 +55,7 @@ def test_a_sliding_ball_comes_to_roll():
 
 
 @pytest.mark.parametrize("damped", [True, False])
-def test_the_tangential_spring_swings_on_where_it_is_not_damped(damped):
+def test_the_tangential_spring_swings_with_its_damping(damped):
     laws = ContactLaws(tangential_damping="tsuji" if damped else "none")
     contact = pair(restitution=0.9, friction=10.0, laws=laws)
     solver = solve(ball_on_plane(contact, velocity=(1e-3 * SPEED, 0.0, 0.0)))
@@ -73,7 +73,7 @@ def test_the_tangential_spring_swings_on_where_it_is_not_damped(damped):
     assert last / first == pytest.approx(math.exp(-3.0 * cycle * decay * TIME_STEP), rel=0.02)
 
 
-def test_rolling_friction_stops_a_ball_where_the_law_says():
+def test_rolling_friction_stops_a_ball_at_the_distance_of_the_law():
     rolling = 0.05
     contact = pair(restitution=0.5, friction=0.5, rolling=rolling)
     arm = lever(contact)

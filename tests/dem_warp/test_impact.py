@@ -174,7 +174,7 @@ def test_the_tangential_spring_turns_with_the_contact():
     assert abs(spring @ normal) < 1e-12 * np.linalg.norm(spring)
 
 
-def test_a_contact_that_opened_starts_anew():
+def test_a_contact_that_opened_starts_without_a_spring():
     # A ball that hops on over a plane, and the same from its state in the first flight on: its second impact
     # is the same, whatever the first one left in its spring.
     contact = pair(restitution=1.0, friction=50.0)

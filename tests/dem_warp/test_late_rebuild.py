@@ -38,7 +38,7 @@ def restored(monkeypatch):
 
 
 def test_steps_are_taken_again_with_a_closer_look_first(heap, monkeypatch):
-    # Of this thin skin two stretches are not seen in time by looks at every other step either (measured).
+    # Looks at every other step see two stretches of this thin skin too late as well (measured).
     cares, advance = [], solver.Solver.advance
 
     def note(self, chunks):
@@ -53,7 +53,7 @@ def test_steps_are_taken_again_with_a_closer_look_first(heap, monkeypatch):
 
 
 def test_a_world_that_is_taken_back_changes_no_other(heap, restored, monkeypatch):
-    # Cycles as long as the fastest grain takes for four skins: grains that fall outrun their lists, less often
+    # Cycles as long as the fastest grain takes for four skins: falling grains outrun their lists, less often
     # with the wider skin, whose world goes on while the other takes its steps again.
     monkeypatch.setattr(solver, "SKIN_PER_SERIAL_CYCLE", 4.0)
     cases = [few(), few(seed=2, skin=2.5e-3)]

@@ -77,7 +77,7 @@ def test_floor_and_tube_carry_the_grains_between_them():
 
 
 @pytest.mark.parametrize("precision", ["double", "mixed"])
-def test_an_impact_gives_the_floor_what_the_ball_loses(precision):
+def test_an_impact_gives_the_floor_the_momentum_of_the_ball(precision):
     fall = grains([0.0, 0.0, 1.2 * RADIUS], velocities=(0.3, 0.0, -1.0))
     setup = world(fall, pair(restitution=0.4, friction=0.3), TIME_STEP, walls=(Plane(),))
     solver = solve(setup, precision=precision)
@@ -90,7 +90,7 @@ def test_an_impact_gives_the_floor_what_the_ball_loses(precision):
     assert after.impulse == pytest.approx(lost, rel={"double": 1e-8, "mixed": 1e-5}[precision])
 
 
-def test_where_no_wall_is_weighed_nothing_adds_up_and_no_bit_moves():
+def test_a_world_without_a_weighed_wall_has_the_same_bits():
     weighed, not_weighed = (solve(replace(pile(), weighed=wall), precision="mixed") for wall in (0, None))
     for solver in (weighed, not_weighed):
         solver.advance(8)
@@ -111,7 +111,7 @@ def test_a_tube_with_friction_carries_less_than_janssen_allows(heap):
     assert 0.01 < heap.observables["wall_drag"] < 1.0 + math.expm1(-x) / x
 
 
-def test_a_heap_has_its_mass_where_its_grains_are(heap):
+def test_the_mass_of_a_heap_is_that_of_its_grains(heap):
     masses = heap.sizes**3 / (heap.sizes**3).sum()
     # The simulator's masses are in float32.
     assert heap.observables["centre_height"] == pytest.approx(masses @ heap.positions[:, 2], rel=1e-6)

@@ -125,7 +125,7 @@ def test_each_law_is_the_same_in_the_production_precision():
         ends[precision] = [state(solver, w)[what][0, i] for w, (what, i) in enumerate(decided.values())]
     assert list(balls()) == list(decided)
     # A position is wrong by half a count, 6e-11 m, of an overlap of 2e-6 m or more: 3e-5 of the forces, and
-    # so of what they change. Measured: 1e-5.
+    # so of the changes that they make. Measured: 1e-5.
     np.testing.assert_allclose(ends["mixed"], ends["double"], rtol=3e-5)
 
 

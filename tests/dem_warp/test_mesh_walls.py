@@ -23,7 +23,6 @@ from worlds import (
     world,
 )
 
-from dem_warp.entries import max_partners
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.triangles import TriangleTable
 from dem_warp.walls import Mesh, Motion, Plane
@@ -156,23 +155,7 @@ def heap_in(mesh: Mesh, seed: int):
     return world(bodies, contact, TIME_STEP, walls=(mesh, Plane()), gravity=downhill(0.0), skin=1.5e-3)
 
 
-def test_worlds_of_a_batch_have_meshes_of_their_own():
-    setups = [heap_in(Mesh.tube(0.0245, 0.06, 12), 1), heap_in(BOX, 2), heap_in(plate(9, shift=0.2), 3)]
-    together = solve(*setups)
-    together.move_wall(1, 0, Motion(spin=(0.0, 0.0, 4.0)))
-    run_for(together, 0.06)
-    assert together.flags.numpy().tolist() == [0, 0, 0]
-    for w, setup in enumerate(setups):
-        alone = solve(setup)
-        if w == 1:
-            alone.move_wall(0, 0, Motion(spin=(0.0, 0.0, 4.0)))
-        run_for(alone, 0.06)
-        assert_same_bits(state(together, w), state(alone))
-        listed = alone.neighbours.entry.numpy() % max_partners(alone.layout.sphere_count)
-        assert (listed >= 12 + 2).any()
-
-
-def test_a_world_goes_on_in_another_batch_with_its_moving_mesh():
+def test_a_world_goes_on_with_its_moving_mesh_in_a_batch_with_another():
     setup = replace(heap_in(Mesh.tube(0.0245, 0.06, 12), 1), skin=3e-3)
     larger = replace(heap_in(BOX, 2), grains=grains(np.mgrid[:2, :2, :5].reshape(3, -1).T * 0.012))
     whole, first, second = solve(setup), solve(setup), solve(larger, setup)

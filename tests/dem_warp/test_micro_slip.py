@@ -115,7 +115,7 @@ def test_gross_slip_is_coulombs_and_turns_with_the_motion():
     assert (np.linalg.norm(force, axis=1) <= 0.4 * (1.0 + 1e-12)).all()
 
 
-def test_a_contact_forgets_what_it_bore_when_it_opens():
+def test_a_contact_forgets_its_force_when_it_opens():
     overlaps = [1.0, 1.0, 0.0, 1.0]
     force = forces(overlaps, along([0.0, 0.05, 0.05, 0.05]))
     assert force[1, 0] < -0.1

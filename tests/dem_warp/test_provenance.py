@@ -72,7 +72,7 @@ print(*(name for name, module in own.items() if not hasattr(module, "__path__"))
 """
 
 
-def test_the_fingerprint_covers_what_batches_laws_and_scenes_load() -> None:
+def test_the_fingerprint_covers_all_files_of_batches_laws_and_scenes() -> None:
     printed = subprocess.run([sys.executable, "-c", LOAD], capture_output=True, text=True, check=True).stdout
     loaded = {f"{name.replace('.', '/')}.py" for name in printed.split()}
     covered = {name for name in engine_files() if not name.endswith("__init__.py")}
@@ -97,7 +97,7 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         del sys.modules[name]
 
 
-def test_a_law_from_outside_counts_where_it_takes_part(outside: Path) -> None:
+def test_a_law_from_outside_counts_if_it_takes_part(outside: Path) -> None:
     glue = import_module("someones_laws.law").Glue
     own, with_glue = engine_fingerprint(LinearCohesion), engine_fingerprint(LinearCohesion, glue)
     assert own == engine_fingerprint() != with_glue

@@ -190,7 +190,7 @@ def test_the_torque_of_deme_waits_for_an_impact_s_time():
     np.testing.assert_allclose(seen[steps:], -MU * lever * WEIGHT, rtol=1e-9)
 
 
-def test_gears_roll_freely_where_the_torque_follows_the_mean_of_the_spins():
+def test_gears_roll_freely_with_the_torque_of_deme():
     laws = rolling("deme")
     contact = pair(restitution=0.2, rolling=MU, laws=laws)
     bodies = [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0 * RADIUS]]
@@ -265,7 +265,7 @@ class RollingBall:
 
 def test_a_ball_on_a_slope_swings_about_the_angle_of_its_spring_and_comes_to_rest():
     contact = springy()
-    # The first swing asks for twice the driving torque at the most; the spring slides at 2.5 times.
+    # The first swing needs twice the driving torque at the most; the spring slides at 2.5 times.
     slope = math.degrees(math.atan(0.4 * MU))
     expected = RollingBall(contact, slope)
     rest = expected.driving_torque / expected.stiffness
@@ -285,7 +285,7 @@ def test_a_ball_on_a_slope_swings_about_the_angle_of_its_spring_and_comes_to_res
     assert np.abs(end["velocities"]).max() < 1e-12
 
 
-def test_a_rolling_ball_stops_where_the_work_of_the_limit_is_its_energy_and_swings_back():
+def test_a_rolling_ball_stops_after_the_work_of_its_energy_and_swings_back():
     speed = 0.1
     contact = springy()
     expected = RollingBall(contact)

@@ -50,7 +50,7 @@ def test_a_flank_is_measured_without_its_foot_and_its_flat_top(degrees):
     assert flank_angle(x, z[::-1], 0.1) == pytest.approx(degrees, rel=1e-12)
 
 
-def test_no_flank_is_seen_where_there_is_none():
+def test_a_surface_without_a_flank_has_no_angle():
     assert flank_angle(np.empty(0), np.empty(0), REACH) is None
     x = np.arange(9.0)
     assert flank_angle(x[:2], x[:2], 0.1) is None

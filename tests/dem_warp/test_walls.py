@@ -270,7 +270,7 @@ def test_a_motion_refuses_bad_values(build, message):
         build()
 
 
-def test_a_motion_of_some_duration_leaves_the_wall_where_it_then_is():
+def test_a_motion_of_some_duration_leaves_the_wall_in_its_last_place():
     amplitude, frequency, step = 2e-3, 50.0, TIME_STEP
     solver = solve(
         world(grains([0.0, 0.0, RADIUS - OVERLAP]), CONTACT, step, walls=(Plane(),), gravity=downhill(0.0))
