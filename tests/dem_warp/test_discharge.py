@@ -166,7 +166,7 @@ def test_the_slopes_end_at_the_slot(drawn):
 def test_a_heap_that_reaches_the_slot_is_a_failure_with_its_reason(drawn):
     run = drawn[1]
     assert run.status == "failed"
-    assert run.reason == "the heap has grown up to the slot: raise the drop, or lower the fill"
+    assert run.reason == "the heap has reached the slot: raise drop, or lower fill_depth"
     assert run.observables["clogged"] == 1
     assert "shear_angle" not in run.observables
     assert run.observables["fallen_mass"] > 0

@@ -26,7 +26,7 @@ from dem_warp.solver import CHUNK, Solver
 from dem_warp.types import WorldFlag
 from dem_warp.walls import Plane
 
-FALL = 0.08
+FALL = 0.1
 """Time in which a pile falls and most of it settles [s]."""
 
 GRAINS = 16
