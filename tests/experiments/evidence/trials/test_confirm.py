@@ -47,9 +47,10 @@ class _Kept:
 
 def test_points_are_those_that_the_bank_was_made_of(bank: Bank, search: Search, points: list[Point]) -> None:
     assert len(points) == len(bank.reasons)
-    numbers = [search.space.conditions.index(point.condition) for point in points]
+    conditions, effects = search.space.conditions, bank.space.names
+    numbers = [conditions.index(point.condition) for point in points]
     assert np.array_equal(numbers, bank.condition)
-    names = ["" if number < 0 else bank.space.names[number] for number in bank.mechanism]
+    names = ["" if number < 0 else effects[number] for number in bank.mechanism]
     assert [point.sizes[0][0] if point.sizes else "" for point in points] == names
 
 
