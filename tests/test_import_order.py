@@ -12,8 +12,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # Rooms of `experiments`, whole folders and files at its root, from the bottom up: a room imports itself and
 # rooms before it. Nothing imports the evidence.
 ROOMS = (
-    "io", "grains", "export", "testing", "studyfile", "measurement", "cases", "calibrate", "bridge", "discover",
-    "report", "journal", "runs", "api", "live", "commands", "cli", "studies", "evidence",
+    "io", "grains", "export", "testing", "studyfile", "measurement", "cases", "calibrate", "bridge",
+    "discover", "report", "journal", "runs", "api", "live", "commands", "cli", "studies", "evidence",
 )  # fmt: skip
 
 # Folders of `doe`, and of `doe.discrepancy` in the order of use.

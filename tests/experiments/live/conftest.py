@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
+import cv2
+import numpy as np
+import pandas as pd
 import pytest
 
 from dem_warp import CaseResult
@@ -39,11 +43,18 @@ def begin(folder: Path, study: Study, cone: Cone) -> Journal:
     return journal
 
 
-def _points(study: Study):  # type: ignore[no-untyped-def]
-    import pandas as pd
-
+def _points(study: Study) -> pd.DataFrame:
     [factor] = study.factors
     return pd.DataFrame({factor.name: [factor.low, factor.high]}, index=[1, 2])
+
+
+def photograph(slope: float) -> bytes:
+    """Draw a heap on a light wall."""
+    picture = np.full((300, 600), 230, np.uint8)
+    corners = np.array([[120, 250], [480, 250], [300, round(250 - 180 * slope)]], np.int32)
+    cv2.fillPoly(picture, [corners], 40)
+    picture[250:] = 120
+    return bytes(cv2.imencode(".png", picture)[1])
 
 
 @pytest.fixture
@@ -53,19 +64,16 @@ def run_folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def served() -> Callable[[Path], Place]:
+def served() -> Iterator[Callable[[Path], Place]]:
     """Serve the page that watches a folder, until the test ends."""
-    from contextlib import ExitStack
+    with ExitStack() as stack:
 
-    stack = ExitStack()
+        def serve(folder: Path) -> Place:
+            place = Place.open()
+            stack.enter_context(serving(place, watch_app(folder, place.token)))
+            return place
 
-    def serve(folder: Path) -> Place:
-        place = Place.open()
-        stack.enter_context(serving(place, watch_app(folder, place.token)))
-        return place
-
-    yield serve  # type: ignore[misc]
-    stack.close()
+        yield serve
 
 
 @pytest.fixture(scope="session")

@@ -9,12 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import cv2
-import numpy as np
 import pytest
 import trimesh
 from browser import Browser, browsing
-from conftest import OTHER, begin
+from conftest import OTHER, begin, photograph
 
 from dem_warp import Case, CaseResult, Progress
 from experiments import api
@@ -286,11 +284,7 @@ def test_photographs_become_the_target(
     place, folder = start_page
     pictures = [tmp_path / f"{number}.png" for number in range(3)]
     for path, slope in zip(pictures, (0.5, 0.55, 0.6), strict=True):
-        picture = np.full((300, 600), 230, np.uint8)
-        corners = np.array([[120, 250], [480, 250], [300, round(250 - 180 * slope)]], np.int32)
-        cv2.fillPoly(picture, [corners], 40)
-        picture[250:] = 120
-        cv2.imwrite(str(path), picture)
+        path.write_bytes(photograph(slope))
     with browsing(chromium, place.url) as browser:
         browser.wait(READY)
         browser.click("input[value=pictures]")

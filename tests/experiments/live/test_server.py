@@ -157,17 +157,9 @@ def test_the_server_listens_on_this_machine_alone() -> None:
     assert place.socket.getsockname()[0] == "127.0.0.1"
     assert len(place.token) >= 32
     assert place.token != Place.open().token
-    with pytest.raises(InputError, match=r"--port: must be a free port of this machine \(.+\), got"):
-        Place.open(_taken())
-
-
-def _taken() -> int:
-    listening = socket.create_server(("127.0.0.1", 0))
-    _open.append(listening)
-    return int(listening.getsockname()[1])
-
-
-_open: list[socket.socket] = []
+    said = r"--port: must be a free port of this machine \(.+\), got"
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(InputError, match=said):
+        Place.open(taken.getsockname()[1])
 
 
 def test_a_missing_library_is_reported_with_the_command_that_installs_it(

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 import trimesh
 from commandline import dem_warp
+from conftest import photograph
 from starlette.testclient import TestClient
 
 from experiments.io.toml_files import read_toml
@@ -199,18 +199,9 @@ def test_an_upload_overwrites_nothing_and_has_an_end(
     assert not (folder / "b.stl").exists()
 
 
-def heap_photograph(slope: float) -> bytes:
-    """Draw a heap on a light wall."""
-    picture = np.full((300, 600), 230, np.uint8)
-    corners = np.array([[120, 250], [480, 250], [300, round(250 - 180 * slope)]], np.int32)
-    cv2.fillPoly(picture, [corners], 40)
-    picture[250:] = 120
-    return bytes(cv2.imencode(".png", picture)[1])
-
-
 def test_photographs_are_measured_as_the_command_does(ask: Ask, upload: Callable, folder: Path) -> None:
     for number, slope in enumerate((0.5, 0.55, 0.6)):
-        upload(f"mine-photos/{number}.png", heap_photograph(slope))
+        upload(f"mine-photos/{number}.png", photograph(slope))
     answer = ask("angles", folder="mine-photos", fit="flank")
     code, out, _ = dem_warp(*shlex.split(answer["command"])[1:], "--json")
     measured = json.loads(out)["pictures"]
@@ -222,7 +213,7 @@ def test_photographs_are_measured_as_the_command_does(ask: Ask, upload: Callable
 
 
 def test_a_bad_photograph_is_a_row_with_its_reason(ask: Ask, upload: Callable) -> None:
-    upload("p-photos/a.png", heap_photograph(0.5))
+    upload("p-photos/a.png", photograph(0.5))
     upload("p-photos/b.png", b"no picture")
     rows = ask("angles", folder="p-photos", fit="flank")["rows"]
     assert [bool(row["reason"]) for row in rows] == [False, True]
