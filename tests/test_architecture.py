@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
 
-# What each package may import beside itself and the standard library; late ones only inside functions: the
+# What each package may import apart from itself and the standard library; late ones only inside functions: the
 # simulator alone needs numpy and Warp, and no window system is loaded before something is drawn.
 LIBRARIES = {
     "dem_warp": {"lazy_loader", "numpy", "warp"},
@@ -160,13 +160,13 @@ def test_imports_are_absolute() -> None:
 def test_a_package_uses_its_own_libraries_only(package: str) -> None:
     early = LIBRARIES[package] | {package}
     late = early | LATE_LIBRARIES[package]
-    strangers = [
+    foreign = [
         i
         for source in sources(package)
         for i in source.imports
         if i.library not in sys.stdlib_module_names and i.library not in (late if i.late else early)
     ]
-    assert strangers == []
+    assert foreign == []
 
 
 @pytest.mark.parametrize("layer", sorted(LAYERS))

@@ -1,4 +1,4 @@
-"""What ``--dry-run`` and ``dem-warp doctor`` say before anything runs."""
+"""Plans of ``--dry-run``, and the findings of ``dem-warp doctor``, before anything runs."""
 
 from __future__ import annotations
 
