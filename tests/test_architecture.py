@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
 
-# What each package may import apart from itself and the standard library; late ones only inside functions: the
+# What each package may import apart from itself and the standard library; late ones only in functions: the
 # simulator alone needs numpy and Warp, and no window system is loaded before something is drawn.
 LIBRARIES = {
     "dem_warp": {"lazy_loader", "numpy", "warp"},
