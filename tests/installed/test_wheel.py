@@ -8,8 +8,8 @@ from installation import COMMIT, Installed
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
-EVIDENCE = {"benchmarks", "point", "record", "trials", "verification"}
-"""Folders of measurements, of trials and of what they left; notes on data stay out too."""
+EVIDENCE = {"evidence", "record"}
+"""Folders of measurements and of their records; notes on data stay out too."""
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
