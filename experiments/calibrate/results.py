@@ -196,7 +196,6 @@ class ClimbResult(StageResult):
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the path."""
         return {"climb": self.path}
 
     @property
@@ -302,7 +301,6 @@ class VerificationResult(_ByResponse[Comparison]):
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the fresh cases."""
         return {"verification": self.cases}
 
 

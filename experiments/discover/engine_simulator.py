@@ -78,7 +78,6 @@ class EngineSimulator:
         self.close()
 
     def close(self) -> None:
-        """End its processes."""
         self._runner.close()
 
     def __call__(self, points: Sequence[Point], progress: OnProgress | None = None) -> Outcomes:
@@ -104,7 +103,7 @@ class EngineSimulator:
         return Outcomes(values, tuple(found[key][1] for key in keys))
 
     def heaps(self, points: Sequence[Point]) -> list[CaseResult]:
-        """Simulate a few points for their heaps, of which the table keeps the observables only; ."""
+        """Simulate a few points for their heaps, of which the table keeps the observables only."""
         return self._workers.simulate([self.case(point) for point in points], self.engine)
 
     def case(self, point: Point) -> Case:

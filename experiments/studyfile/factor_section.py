@@ -75,12 +75,10 @@ class FactorSection(Section):
 
     @property
     def unit(self) -> str:
-        """Natural unit."""
         return self.low.unit
 
     @property
     def dimension(self) -> Dimension:
-        """Dimension of the parameter."""
         return self.setters[0].dimension
 
     @property
@@ -104,7 +102,6 @@ class FactorSection(Section):
 
     @property
     def middle(self) -> Quantity:
-        """Middle of the range."""
         return Quantity(self.factor().center, self.unit)
 
     @property

@@ -72,7 +72,6 @@ class ShapeSection(Section):
         return unit
 
     def one_shape(self) -> ClumpShape:
-        """Build the shape."""
         if self.clump is not None and self.sphere is not None:
             raise ValueError("must have a clump (a file) or a sphere (a radius), not both")
         if self.clump_unit is not None and self.clump is None:
@@ -155,7 +154,6 @@ class GrainSection(MaterialSection, ShapeSection):
         return (*clumps, *(self.sizes.files if self.sizes else ()))
 
     def population(self) -> GrainPopulation:
-        """Build the engine's population."""
         shape = self.shape()
         if self.sizes is not None and isinstance(shape, ClumpShape):
             return self.sizes.population(shape, self.material())

@@ -43,7 +43,6 @@ class SceneSection(LibrarySection):
 
     @property
     def observables(self) -> Mapping[str, Observable]:
-        """Observables of the test."""
         return self.kind.observables
 
     def scene(self, wall: Material) -> PouredScene:

@@ -101,7 +101,6 @@ class Generated:
     """Default of a field that takes a name as well as a section."""
 
     def read(self, value: object, info: ValidationInfo) -> Section:
-        """Validate the section."""
         try:
             return self.section().model_validate(value, context=info.context)
         except ValidationError as error:

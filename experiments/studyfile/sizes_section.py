@@ -113,7 +113,6 @@ class SizesSection(Section):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Files that it names."""
         return tuple(file for file in (self.sieves, self.counts) if file is not None)
 
     def cut_into_classes(self) -> Classes:

@@ -113,7 +113,6 @@ class Study(Physics):
 
     @property
     def file(self) -> Path:
-        """The study file."""
         return self._places.file
 
     @cached_property
@@ -347,7 +346,6 @@ class Study(Physics):
 
     @cached_property
     def _factors(self) -> dict[str, FactorSection]:
-        """The factors by name."""
         return {section.name: section for section in self.factor_sections}
 
 

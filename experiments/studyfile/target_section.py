@@ -48,7 +48,6 @@ class ViewSection(Section):
 
     @property
     def view(self) -> View:
-        """The facts."""
         return View(self.crop, self.plate, self.heap, self.elevation, self.distance)
 
     @model_validator(mode="after")
@@ -94,7 +93,6 @@ class ResponseSection(Section):
 
     @property
     def title(self) -> str:
-        """Its name."""
         return self.name or self.observable
 
     @property

@@ -19,7 +19,6 @@ class MaterialSection(Section):
     """Poisson's ratio."""
 
     def material(self) -> Material:
-        """Build the engine's material."""
         return Material(self.density, self.shear_modulus, self.poisson_ratio)
 
 
@@ -34,7 +33,6 @@ class InteractionSection(Section):
     """Coefficient of rolling friction."""
 
     def interaction(self) -> Interaction:
-        """Build the engine's interaction."""
         return Interaction(**dict(self))
 
 

@@ -176,14 +176,6 @@ def test_a_truth_that_is_not_where_the_angle_says_is_called_incompatible() -> No
     assert check.distance > 0.4
 
 
-def test_a_truth_beyond_the_design_is_neither_compatible_nor_not() -> None:
-    # On the same contour near F = 0.42, but E lies four half-ranges of the design away.
-    study = AnalyticStudy(target=hidden(E=0.74, F=0.30))
-    check = calibrate(study, AnalyticHeaps(two_frictions)).optimum.truth
-    assert not check.inside_design
-    assert check.compatible is None
-
-
 def test_a_fixed_point_is_taken_even_where_the_surface_misses_the_target() -> None:
     fixed = settings(surface={"center": {"E": 0.36, "F": 0.22}}, optimum={"point": {"E": 0.38, "F": 0.25}})
     study = AnalyticStudy(target=hidden(E=0.5, F=0.45), campaign=fixed)
@@ -272,14 +264,6 @@ def test_a_climb_without_slope_is_a_plateau() -> None:
     campaign = calibrate(study, AnalyticHeaps(lambda row: 20.0))
     assert campaign.outcome is Outcome.PLATEAU
     assert campaign.climb.end is ClimbEnd.FLAT
-
-
-def test_a_design_far_from_the_target_has_no_contour() -> None:
-    study = AnalyticStudy(campaign=settings(surface={"center": {"E": 0.36, "F": 0.22}}))
-    campaign = calibrate(study, AnalyticHeaps(two_frictions))
-    assert campaign.outcome is Outcome.NO_CONTOUR
-    assert campaign.surface is not None
-    assert campaign.optimum is None
 
 
 def test_heaps_that_change_at_the_optimum_are_not_verified() -> None:

@@ -152,7 +152,8 @@ def test_a_tilted_plate_is_found_and_added_to_the_study(
     assert size.value - width < 5.0 < size.value + width
     training, held_out = found.before_after
     assert training.after.value < training.before.value
-    assert held_out.after.value < held_out.before.value
+    # The noise of the heaps alone is left in the condition that took no part.
+    assert held_out.after.low < held_out.degrees_of_freedom < held_out.after.high
     again = load_study(tmp_path / "out" / "study-with-plate_tilt.toml")
     measured_study(again)
     assert again.factors[-1].name == "plate_tilt"
