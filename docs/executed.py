@@ -1,4 +1,4 @@
-"""Which pages were run, from which cells, and how long they took: ``docs/executed.csv``.
+"""Record of the pages that were run, their cells and their time: ``docs/executed.csv``.
 
 ``-D executed_pages=quick`` runs only the pages that took no longer than `QUICK` seconds in the record,
 ``-D executed_pages=howto/heap,tutorials/wheat`` only these. ``-D executed_record=1`` writes the rows of the

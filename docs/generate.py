@@ -97,8 +97,8 @@ def observables_page() -> str:
         markdown_table(("name", "meaning", "unit", "instrument", "definition"), rows),
     ]
     for name, scene in SCENES.items():
-        told = [(f"`{each}`", unit, meaning) for each, (unit, meaning) in scene.observables.items()]
-        parts += [f"## Told by `[scene.{name}]`", markdown_table(("name", "unit", "definition"), told)]
+        rows = [(f"`{each}`", unit, meaning) for each, (unit, meaning) in scene.observables.items()]
+        parts += [f"## Measured by `[scene.{name}]`", markdown_table(("name", "unit", "definition"), rows)]
     return "\n\n".join(parts)
 
 

@@ -155,8 +155,8 @@ def exporter_explains_its_terms(exporter: Exporter, test: ExportedTest) -> None:
         require(len(set(names)) == len(names), f"the names of terms must differ, got {', '.join(names)}")
         for term in terms:
             require(math.isfinite(term.value), f"{term.name}: must be finite, got {term.value}")
-            told = term.name and term.unit and term.formula and term.source
-            require(told, f"{term.name}: must have a name, a unit, a formula and a source")
+            complete = term.name and term.unit and term.formula and term.source
+            require(complete, f"{term.name}: must have a name, a unit, a formula and a source")
 
 
 def _translated(exporter: Exporter, test: ExportedTest) -> Translation | None:
@@ -171,8 +171,8 @@ def exporter_explains_its_input(exporter: Exporter, test: ExportedTest) -> None:
     require(all(found.files.values()), "every file must have a text")
     require(found.translated, "the translation must say what became of each part of the test")
     for row in found.translated:
-        told = row.subject and (row.here or row.there)
-        require(told, f"{row.subject}: a row must have a subject, and its form here or there")
+        complete = row.subject and (row.here or row.there)
+        require(complete, f"{row.subject}: a row must have a subject, and its form here or there")
     require(_translated(exporter, test) == found, "the same test must give the same input")
 
 

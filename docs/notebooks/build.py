@@ -45,7 +45,7 @@ def notebook_of(script: str) -> nbformat.NotebookNode:
 
 
 def main(names: list[str]) -> None:
-    """Execute notebooks, all where none is named, and write each beside its script."""
+    """Execute the named notebooks (default: all), and write each next to its script."""
     chosen = [f"{name}_source.py" for name in names] or ["*_source.py"]
     for script in sorted(path for pattern in chosen for path in FOLDER.glob(pattern)):
         notebook = notebook_of(script.read_text(encoding="utf-8"))

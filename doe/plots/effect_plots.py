@@ -82,7 +82,7 @@ def interaction_plot(
     places = table.index.to_numpy(dtype=float) if numeric else np.arange(len(table))
     if len(table.columns) > len(DASHES):
         raise DesignError(
-            f"up to {len(DASHES)} lines are told apart; {trace!r} has {len(table.columns)} levels"
+            f"up to {len(DASHES)} lines can be distinguished, but {trace!r} has {len(table.columns)} levels"
         )
     for level, dash, color in zip(table, DASHES, (BLUE, ORANGE, VERMILION, MUTED), strict=False):
         label = f"{trace} = {_level_text(design.factor(trace), level)}"

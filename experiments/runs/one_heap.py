@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from dem_warp import Case
 from experiments.cases import Heap, simulate_heap, write_heap
-from experiments.cases.show.heap import filmed_by
+from experiments.cases.show.heap import check_filmed, filmed_by
 from experiments.runs.choices import Prepared
 from experiments.runs.run_folder import open_run
 from experiments.studyfile import Study
@@ -46,9 +46,11 @@ def run_heap(prepared: Prepared, order: HeapOrder) -> Heap:
 
     Raise InputError when the folder cannot be used, or frames are asked of other workers than this machine's.
     """
+    if order.frames is not None:
+        check_filmed(prepared.study)
     with open_run("heap", prepared) as run:
         if order.frames is not None:
-            filmed_by(run.study, run.workers)
+            filmed_by(run.workers)
         with run.batch(order.scene or "heap", lambda: len(run.store)) as progress:
             wanted = (order.settings, order.seed, run.workers, progress, order.place, order.frames)
             heap = simulate_heap(run.study, *wanted, run.store)

@@ -54,7 +54,7 @@ def full(composite: tuple[Design, pd.Series]) -> Surface:
 
 @pytest.fixture
 def reduced(full: Surface) -> Surface:
-    """The paper's second model: F^2 is removed, E^2 stays although it is not significant either."""
+    """Return the paper's second model: F^2 is removed, E^2 stays although it is not significant either."""
     return full.drop("F^2")
 
 

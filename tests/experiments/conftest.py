@@ -91,7 +91,7 @@ def write_study(tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def small_study(write_study: Callable[..., Path]) -> Study:
-    """The small study: spheres, one factor."""
+    """Return the small study: spheres, one factor."""
     return load_study(write_study())
 
 

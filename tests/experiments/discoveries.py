@@ -59,7 +59,7 @@ FACTORS = ("E", "F")
 
 
 def made_terms(study: Study) -> Terms:
-    """The vocabulary of the discoveries below."""
+    """Return the vocabulary of the discoveries below."""
     mechanisms = [
         SimpleNamespace(
             name=name,
@@ -104,7 +104,7 @@ def made_data(rng: np.random.Generator) -> Data:
 
 
 def made_fit(data: Data, residuals: np.ndarray, mechanisms: tuple[str, ...] = ()) -> Fit:
-    """A fit whose residuals are known; predictions are known half as well as the data."""
+    """Return a fit whose residuals are known; predictions are known half as well as the data."""
     training = residuals[: HELD_OUT.index(True)]
     sizes = {"contact_adhesion": Interval(0.041, 0.052, 0.064), "plate_tilt": Interval(1.2, 2.1, 3.1)}
     p = np.where(np.abs(residuals) > 3.4, 1e-3, 0.4)
@@ -127,7 +127,7 @@ def made_fit(data: Data, residuals: np.ndarray, mechanisms: tuple[str, ...] = ()
 
 
 def made_candidates(admitted: int) -> tuple[Candidate, ...]:
-    """Three mechanisms, of which so many are admitted."""
+    """Return three mechanisms, of which the first few are admitted."""
     base = Candidate(
         mechanisms=("contact_adhesion",),
         score=14.2,

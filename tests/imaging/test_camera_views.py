@@ -188,7 +188,7 @@ def test_a_large_picture_is_measured_as_well_as_a_small_one() -> None:
 
 
 def shaded_heap(hue: tuple[float, float, float]) -> np.ndarray:
-    """A heap of 30 degrees on a table; a soft patch about its feet changes the colours of the wall."""
+    """Return a heap of 30 degrees on a table; a soft patch about its feet changes the colours of the wall."""
     heap = draw(DrawnHeap(30, 30, grain=14), Camera(heap=GRAIN, background=WALL, plate=BLUE)).astype(float)
     table = int(np.flatnonzero(heap[:, 0, 2] < 0.5 * (WALL[2] + BLUE[2]))[0])
     wall = np.linalg.norm(heap - GRAIN, axis=2) / np.linalg.norm(np.subtract(WALL, GRAIN))
@@ -212,7 +212,7 @@ def test_an_edge_that_depends_on_the_threshold_is_doubted(hue: tuple[float, floa
 
 
 def on_a_row(color: tuple[int, int, int]) -> np.ndarray:
-    """A heap of 30 degrees on a row as high as a grain of a heap of 20 grains across, and hardly wider."""
+    """Return a heap of 30 degrees on a row as high as a grain of a heap of 20 grains, and hardly wider."""
     picture = np.full((420, 700, 3), WALL, np.uint8)
     cv2.fillPoly(picture, [np.array([[150, 280], [350, 165], [550, 280]])], GRAIN, cv2.LINE_AA)
     cv2.rectangle(picture, (135, 280), (565, 300), color, -1)

@@ -64,7 +64,7 @@ def test_spheres_outside_the_picture_are_no_error() -> None:
 
 @pytest.fixture
 def pictures() -> list[np.ndarray]:
-    """A ball that goes from left to right."""
+    """Return a ball that goes from left to right."""
     return [SCENERY.draw([[x, 0.0, 0.01]], [0.008], [0], [], "") for x in (-0.03, 0.0, 0.03)]
 
 

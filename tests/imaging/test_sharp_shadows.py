@@ -23,7 +23,7 @@ def in_hard_light(
     grain: float = 0.0,
     texture: float = 0.0,
 ) -> np.ndarray:
-    """A heap of 30 degrees whose shadow, 0.9 of its height, keeps a share of the wall's light.
+    """Return a heap of 30 degrees whose shadow, 0.9 of its height, keeps a share of the wall's light.
 
     It lies `aside` of the heap's half width to the right (side 1), to the left (-1), or on both sides.
     """

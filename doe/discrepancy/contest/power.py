@@ -110,8 +110,8 @@ class Effects:
         found = stats.norm.cdf(np.sqrt(trusted) - settings.least_ratio)
         nearest = np.array([self.apart(index, self.chance).min(axis=0) for index in range(len(self.names))])
         nearest = np.maximum(nearest, LEAST_LENGTH**2).reshape(found.shape)
-        told = stats.norm.cdf((nearest - settings.tie_margin) / (2.0 * np.sqrt(nearest)))
-        return np.minimum(found, told)
+        separated = stats.norm.cdf((nearest - settings.tie_margin) / (2.0 * np.sqrt(nearest)))
+        return np.minimum(found, separated)
 
 
 def _errors(fitted: Fitted, names: Sequence[str], theta: np.ndarray) -> np.ndarray:

@@ -126,7 +126,7 @@ def simulate_heap(
     if frames is None:
         result = _result(study, case, workers, progress, store)
     else:
-        result, film = simulate_frames(case, frames, filmed_by(study, workers).name, progress)
+        result, film = simulate_frames(case, frames, filmed_by(workers).name, progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
     observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
     return Heap(study, values, seed, result, observed, scene, film)
@@ -148,14 +148,15 @@ def _result(
     return result
 
 
-def filmed_by(study: Study, workers: Workers) -> OwnWorkers:
-    """Return the workers, which must be this machine's and have dem-warp's own engine to keep frames.
-
-    Raise InputError when they are not.
-    """
+def check_filmed(study: Study) -> None:
+    """Raise InputError when another engine than dem-warp's simulates the study: it keeps no frames."""
     if engine_of(study) is not None:
         other = study.engine and (study.engine.name or study.engine.command)
         raise InputError("--frames", "must run on dem-warp's own engine", other)
+
+
+def filmed_by(workers: Workers) -> OwnWorkers:
+    """Return the workers, which must be this machine's to keep frames; raise InputError when they are not."""
     if not isinstance(workers, OwnWorkers):
         raise InputError("--frames", "must run on this machine", workers.machine)
     return workers

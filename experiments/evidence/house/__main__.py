@@ -1,4 +1,4 @@
-"""Print the counts of the house beside their limits; with --walk also those of a traced calibration.
+"""Print the counts of the house next to their limits; with --walk also those of a traced calibration.
 
 python -m experiments.evidence.house [--walk]
 """

@@ -15,7 +15,7 @@ NOISE, READING = 0.1, 0.1
 
 
 def curve(settings: np.ndarray, coordinate: float) -> np.ndarray:
-    """True curve of a model of two settings."""
+    """Return true curve of a model of two settings."""
     return -20.0 * np.tanh(PLACES / (18.0 - 4.0 * settings[0])) * coordinate / 3.0 + 2.0 * settings[1]
 
 

@@ -33,7 +33,7 @@ BLENDED = ("alpha", "delta")
 BEYOND = 0.45
 """Standard deviation of what it does besides, in that of one run at its largest size."""
 SATURATION = 0.3
-"""Of ``alpha`` in the saturating world, in a range of 2: the first third has nearly the whole effect."""
+"""Saturation of ``alpha``, in a range of 2: the first third has nearly the whole effect."""
 SETTINGS = Settings(bank_points=128, bank_mechanism_points=64)
 
 
@@ -54,7 +54,7 @@ class SyntheticSimulator:
     """Quadratic responses in coded units, in units of the noise, times an observable's own scale.
 
     ``twin`` acts as ``alpha`` does, but for one part in a hundred; ``blend`` nearly as ``alpha`` and
-    ``delta`` do together; ``stranger`` is in no library.
+    ``delta`` do together; ``outsider`` is in no library.
     """
 
     space: SearchSpace
@@ -66,7 +66,7 @@ class SyntheticSimulator:
         return Outcomes(values, ("",) * len(points))
 
     def mean(self, theta: Sequence[float], sizes: Mapping[str, float], condition: str) -> np.ndarray:
-        """Expected observables, (observables,)."""
+        """Return expected observables, (observables,)."""
         coded = self.space.coded_theta(np.array(theta))
         linear, curved = _base(condition)
         total = (
@@ -117,7 +117,7 @@ def _signature(name: str, condition: str) -> tuple[np.ndarray, np.ndarray]:
         parts = [_signature(part, condition) for part in BLENDED]
         nudge = np.random.default_rng([18, CONDITIONS.index(condition)]).standard_normal(len(OBSERVABLES))
         return sum(direct for direct, _ in parts) + BEYOND * nudge, sum(turned for _, turned in parts)
-    number = (*MECHANISMS, "stranger").index(name)
+    number = (*MECHANISMS, "outsider").index(name)
     common = np.random.default_rng([13, number])
     own = np.random.default_rng([14, number, CONDITIONS.index(condition)])
     # Mechanisms act through a few ways to change the observables, so their signatures are alike.
@@ -136,7 +136,7 @@ def _ways(condition: str) -> np.ndarray:
 
 @cache
 def bank(mechanisms: tuple[str, ...] = MECHANISMS) -> Bank:
-    """The bank of the synthetic world."""
+    """Return the bank of the synthetic world."""
     points = bank_points(space(mechanisms), SETTINGS, seed=1)
     simulator = SyntheticSimulator(space(mechanisms))
     return make_bank(space(mechanisms), OBSERVABLES, points, simulator(points))
@@ -144,7 +144,7 @@ def bank(mechanisms: tuple[str, ...] = MECHANISMS) -> Bank:
 
 @cache
 def emulator(mechanisms: tuple[str, ...] = MECHANISMS) -> Emulator:
-    """The emulator of the synthetic world's bank."""
+    """Return the emulator of the synthetic world's bank."""
     return fit_emulator(bank(mechanisms))
 
 
@@ -182,7 +182,7 @@ class Saturating(SyntheticSimulator):
 
 
 def saturating_bank() -> tuple[Saturating, Bank]:
-    """A bank of that world, of sizes all over the range, which knows nothing of it."""
+    """Return a bank of that world, of sizes all over the range, which knows nothing of it."""
     world = Saturating(space(("alpha",)))
     points = bank_points(world.space, SETTINGS, seed=5)
     return world, make_bank(world.space, OBSERVABLES, points, world(points))

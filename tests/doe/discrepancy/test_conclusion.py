@@ -1,4 +1,4 @@
-"""When two models count as told apart."""
+"""Rules by which two models count as distinct."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_qs_of_two_models_part_by_what_is_open_of_their_predictions() -> None:
 def test_a_model_gains_nothing_by_what_is_open_of_it_nor_by_scatter_that_nobody_saw() -> None:
     model = Model(emulator().without("twin"), ("delta",), 0.2)
     fitted = fit(Stack(model, gather(measure({"delta": 0.6}, 3), model.emulator).training))
-    # the same residuals beside four times the noise: Q falls to a quarter, and the determinant takes it back
+    # the same residuals with four times the noise: Q falls to a quarter, and the determinant takes it back
     open_ = fitted.stack.open_error(fitted.x)
     wide = 4.0 * (fitted.covariance - open_) + open_
     wider = replace(fitted, covariance=wide, whitening=whiten(wide))

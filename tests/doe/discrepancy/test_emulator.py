@@ -183,7 +183,7 @@ def test_a_kriged_part_as_of_equal_runs_is_refused() -> None:
     runs = _kriged_bank()
     assert runs.kriged is not None
     table = runs.kriged.table()
-    table[0, 3], table[0, 4:7] = 1e30, 1e9  # all runs alike, their noise nothing beside: no inverse
+    table[0, 3], table[0, 4:7] = 1e30, 1e9  # all runs alike, their noise negligible: no inverse
     with pytest.raises(RuleError, match="can be inverted"):
         fit_emulator(replace(runs, kriged=KrigedParts.from_table(runs.runs_sha256, table)))
 
@@ -257,7 +257,7 @@ def test_scales_of_coefficients_are_found_behind_their_noise() -> None:
 
 
 def test_the_scatter_under_a_mechanism_has_a_correlation_of_its_own() -> None:
-    """By its size, as far as its runs outweigh those that the base's correlation is worth."""
+    """Size decides, as far as its runs outweigh those that the base's correlation is worth."""
     rng, count = np.random.default_rng(11), 300
     theta, size = rng.uniform(-1.0, 1.0, (count, 1)), rng.uniform(0.0, 1.0, count)
     noise = fit_noise(theta, rng.standard_normal((count, 2)), np.full(2, 1e-9))

@@ -46,7 +46,7 @@ def _powers(fitted: Fitted) -> dict[str, Power]:
 
 @cache
 def _complete() -> list[Fitted]:
-    """Base models calibrated to data sets that lack nothing."""
+    """Return base models calibrated to data sets that lack nothing."""
     return [_calibrated(measure({}, seed)) for seed in range(NULLS)]
 
 

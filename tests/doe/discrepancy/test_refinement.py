@@ -76,7 +76,7 @@ def test_the_error_of_the_shift_widens_what_is_said_of_a_size() -> None:
     assert 1.8 < widths[1] / widths[0] < 2.2
 
 
-def corrected_beside(shift: np.ndarray, runs: Runs) -> Model:
+def corrected_by_runs(shift: np.ndarray, runs: Runs) -> Model:
     """Model whose shift is given, corrected by what runs show it to miss besides."""
     shifted = replace(model(), shift=Shift(shift, 0.02 * np.eye(4)))
     ones = np.ones(len(OBSERVABLES))
@@ -90,11 +90,11 @@ def corrected_beside(shift: np.ndarray, runs: Runs) -> Model:
 
 def test_corrections_take_back_what_another_shift_does_to_the_emulated() -> None:
     runs = runs_of_a_world_that_is_off(2)
-    known = corrected_beside(OFF, runs)
+    known = corrected_by_runs(OFF, runs)
     for condition in CONDITIONS:
         slopes = known.shift_slopes(CENTRE, Block.of_runs(condition, np.arange(len(OBSERVABLES)), 8))
         for step, slope in zip(0.02 * np.eye(4), slopes.T, strict=True):
-            sides = [corrected_beside(OFF + side * step, runs) for side in (1.0, -1.0)]
+            sides = [corrected_by_runs(OFF + side * step, runs) for side in (1.0, -1.0)]
             ahead, behind = (one.predict(CENTRE[None], condition)[0] for one in sides)
             # The same differences, of which the corrections are linear.
             np.testing.assert_allclose((ahead - behind) / 0.04, slope, atol=1e-6 * np.abs(slopes).max())

@@ -31,7 +31,7 @@ NAMES = ("alpha", "delta", "twin")
 
 @cache
 def small(seed: int) -> Emulator:
-    """The emulator of a bank of twelve runs of each mechanism."""
+    """Return the emulator of a bank of twelve runs of each mechanism."""
     points, simulator = bank_points(space(NAMES), SMALL, seed), SyntheticSimulator(space(NAMES))
     return fit_emulator(make_bank(space(NAMES), OBSERVABLES, points, simulator(points)))
 

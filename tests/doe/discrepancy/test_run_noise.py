@@ -68,7 +68,7 @@ def test_a_correlation_is_drawn_towards_that_of_all_conditions_the_more_the_fewe
 
 
 def test_conditions_learn_from_one_another_how_a_variance_changes() -> None:
-    """As far as they are alike: two dozen repeats know a slope to .4, all five conditions to .2."""
+    """Pooled as far as they are alike: two dozen repeats know a slope to .4, all five conditions to .2."""
     rng, alone, together = np.random.default_rng(21), [], []
     for _ in range(20):
         planes = np.array([0.3, 0.8, 0.0, -0.4])[:, None] + _apart(rng, (4, 6))
@@ -124,7 +124,7 @@ def _worlds(rng: np.random.Generator) -> list[World]:
 def _squares(rng: np.random.Generator, worlds: Sequence[World], count: int) -> np.ndarray:
     """Weighted squares of means of eight heaps less what a bank of 24 points and two repeats predicts.
 
-    Of heaps at so many points, (count,).
+    The number of points is (count,).
     """
     theta, points = rng.uniform(-1.0, 1.0, (24, 3)), rng.uniform(-0.8, 0.8, (count, 3))
     repeats, means = [], []

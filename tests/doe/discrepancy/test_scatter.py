@@ -8,7 +8,7 @@ FREEDOM = 40.0
 
 
 def scatter_of(moments: np.ndarray) -> Scatter:
-    """Scatter of a condition whose mean products of deviations are so many."""
+    """Scatter of a condition with the given mean products of deviations."""
     return Scatter({"base": FREEDOM * moments}, {"base": np.full(moments.shape, FREEDOM)})
 
 

@@ -28,17 +28,17 @@ def test_over_one_saturation_the_effect_of_a_step_falls_to_1_over_e() -> None:
 
 def test_a_bank_keeps_its_sizes_under_another_saturation() -> None:
     _, bank = saturating_bank()
-    told = bank.saturating({"alpha": SATURATION, "beta": 1.0})
-    sizes = [one.natural(size) for size in told.coded_size for one in told.space.mechanisms]
+    saturating = bank.saturating({"alpha": SATURATION, "beta": 1.0})
+    sizes = [one.natural(size) for size in saturating.coded_size for one in saturating.space.mechanisms]
     assert sizes == pytest.approx(2.0 * bank.coded_size, abs=1e-9)
-    assert told.saturating({"alpha": None}).coded_size == pytest.approx(bank.coded_size, abs=1e-9)
+    assert saturating.saturating({"alpha": None}).coded_size == pytest.approx(bank.coded_size, abs=1e-9)
 
 
 def test_an_emulator_that_knows_the_saturation_is_right_where_the_other_is_not() -> None:
     world, bank = saturating_bank()
-    told = bank.saturating({"alpha": SATURATION})
+    saturating = bank.saturating({"alpha": SATURATION})
     misses = []
-    for known in (bank, told):
+    for known in (bank, saturating):
         emulator, errors = fit_emulator(known), []
         for natural in np.linspace(0.1, 2.0, 20):
             x = np.array([[0.0, 0.0, 0.0, emulator.space.coded_size("alpha", natural)]])

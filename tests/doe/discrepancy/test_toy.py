@@ -41,7 +41,7 @@ SCATTER = 0.02
 
 
 def response(theta: Sequence[float], sizes: Mapping[str, float], condition: str) -> np.ndarray:
-    """Expected observables of a circuit, say: mild curvature, and mechanisms that act each in its own way."""
+    """Return expected observables: mild curvature, and mechanisms that act each in its own way."""
     gain, delay = theta
     speed = {"slow": 1.0, "fast": 1.6}[condition]
     base = np.array([gain / speed, gain**2 / 3.0, delay * speed, gain * delay, gain + delay])
@@ -96,10 +96,10 @@ def test_the_package_has_never_heard_of_grains() -> None:
     words = re.compile(r"heap|grain|clump|\bdem\b|tube|clog|camera|photograph|friction|sphere", re.IGNORECASE)
     files = sorted(Path(discrepancy.__file__).parent.rglob("*.py"))
     assert len(files) > 20
-    told = [
+    found = [
         f"{path.name}:{number}: {line.strip()}"
         for path in files
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
         if words.search(line)
     ]
-    assert told == []
+    assert found == []

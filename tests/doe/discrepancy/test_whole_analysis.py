@@ -36,7 +36,7 @@ def _run(
     is_lost: Callable[[int, Point], bool] = lambda *_: False,
     settings: Settings = SETTINGS,
 ) -> tuple[Discovery, list[list[Point]]]:
-    """Drive an analysis; lost cases, told by their number in the wave and their point, have no values."""
+    """Drive an analysis; lost cases, given by their number in the batch and their point, have no values."""
     waves, simulator = [], SyntheticSimulator(space())
     analysis = analyse(measured, known, settings, seed=5)
     try:
@@ -179,7 +179,7 @@ def test_a_pair_that_cannot_be_simulated_is_not_named() -> None:
 
 
 def test_what_the_library_lacks_is_unknown() -> None:
-    found, _ = _run(measure({"stranger": 1.0}, 6), FEW)
+    found, _ = _run(measure({"outsider": 1.0}, 6), FEW)
     assert found.verdict == Verdict.UNKNOWN
     assert found.named == ()
     assert found.before_after == ()
@@ -189,12 +189,12 @@ def test_what_the_library_lacks_is_unknown() -> None:
     assert found.closest.mechanisms == found.candidates[0].mechanisms
     assert found.candidates[0].simulated
     assert found.reason.startswith(" with ".join(found.closest.mechanisms))
-    # both of any two models are refused: nothing is to be told apart
+    # both of any two models are refused: nothing is to be distinguished
     assert found.next_experiment is None
 
 
 def test_what_cannot_fit_costs_one_look() -> None:
-    _, waves = _run(measure({"stranger": 2.0}, 6), FEW)
+    _, waves = _run(measure({"outsider": 2.0}, 6), FEW)
     one_model = SETTINGS.refinement_points * SETTINGS.refinement_repeats * len(CONDITIONS)
     # No mechanism of the library, and not the base, comes near: the best is run to be sure, no other is.
     assert len(waves[0]) == one_model

@@ -16,7 +16,7 @@ EXPLORED = np.pi * 2.0
 """Area of the disc out to the farthest runs, at a coded distance of sqrt(2)."""
 
 LARGE = 10**6
-"""Measurements, so many that t is normal."""
+"""Number of measurements from which t is normal."""
 
 SLOPES = ((1.0, 0.5), (0.2, -1.0), (0.7, 0.7))
 """Three planes no two of which are parallel."""
@@ -42,12 +42,12 @@ class Plane:
 
 
 def goal(*slopes: float, target: float = 0.0, se: float = 0.1) -> Goal:
-    """A plane through the centre, and a target of a known standard error."""
+    """Return a plane through the centre, and a target of a known standard error."""
     return Goal(Plane(slopes), Sample(target, se * np.sqrt(LARGE), LARGE))
 
 
 def half_width(se: float, responses: int) -> float:
-    """Half width of the band of one among so many responses at 95 %."""
+    """Return the half width of the band of one among several responses at 95 %."""
     return float(stats.norm.isf(0.025 / responses)) * se
 
 

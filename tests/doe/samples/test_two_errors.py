@@ -14,7 +14,7 @@ PAIRS = [(1.0, 1.0), (1.0, 11.0), (7.0, 1.0), (7.0, 2.0), (3.0, 11.0), (7.0, 4.0
 def test_the_level_is_kept_at_every_ratio_of_the_variances(first: float, second: float, alpha: float) -> None:
     rules = TwoErrors(first, second)
     low, high = rules.extreme_levels(alpha)
-    # k and q are interpolated between levels: 2 % of the level beside the slack.
+    # k and q are interpolated between levels: 2 % of the level in addition to the slack.
     assert high <= 1.02 * MOST * alpha
     if min(first, second) >= 2.0 and max(first, second) >= 7.0 and alpha == 0.05:
         assert low >= 0.98 * (1.0 - STRAY) * alpha  # (7, 2) strays by .135, the least of all k and q

@@ -18,7 +18,7 @@ FACTORS = [Factor("A", 0.0, 10.0), Factor("B", 0.2, 0.4), Factor("C", -5.0, 5.0)
 
 @pytest.fixture
 def plane():
-    """theta = 20 + 3 a - 1.5 b + 0 c in coded units."""
+    """Plane theta = 20 + 3 a - 1.5 b + 0 c in coded units."""
     design = plackett_burman(FACTORS)
     return screen(design, 20.0 + 3.0 * design.coded["A"] - 1.5 * design.coded["B"])
 

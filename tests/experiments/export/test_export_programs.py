@@ -46,7 +46,7 @@ PROGRAMS = {"yade": "yade", "deme": "deme"}
 
 
 def exported(laws: str, **changes: Any) -> ExportedTest:
-    """A small lifted cylinder in the laws of a code."""
+    """Return a small lifted cylinder in the laws of a code."""
     scene = LiftedCylinder(diameter=0.02, height=0.03, wall_material=WALL, grain_count=40)
     case = Case(
         scene=replace(scene, **changes),
@@ -182,7 +182,7 @@ def test_mercury_gets_every_number_that_its_driver_asks_for() -> None:
 
 @pytest.fixture
 def course(tmp_path: Any, monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Translation]) -> Any:
-    """A course as a program has it, of a tube that is filled to its rim."""
+    """Return a course as a program has it, of a tube that is filled to its rim."""
     for name, text in inputs["yade"].files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     written = json.loads((tmp_path / "test.json").read_text(encoding="utf-8"))

@@ -98,7 +98,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="session")
 def plotly() -> str:
-    """The 4.8 MB of plotly.js."""
+    """Return the 4.8 MB of plotly.js."""
     return get_plotlyjs()
 
 

@@ -74,7 +74,7 @@ def launched(driver: Playwright, *arguments: str) -> Browser:
 
 
 def small_heap() -> SolidHeap:
-    """A heap of forty clumps of two spheres."""
+    """Return a heap of forty clumps of two spheres."""
     place = np.random.default_rng(1).uniform([-0.02, -0.02, 0.002], [0.02, 0.02, 0.012], (40, 3))
     result = CaseResult(
         "finished",
@@ -100,7 +100,7 @@ def files(
     whole_study: Study,
     plotly: str,
 ) -> dict[str, Path]:
-    """A calibration's page and a search's, with all that they can hold."""
+    """Return a calibration's page and a search's, with all that they can hold."""
     folder, picture = (
         tmp_path_factory.mktemp("pages"),
         HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8)),
@@ -148,7 +148,7 @@ def opened(request: pytest.FixtureRequest, browser: Browser, files: dict[str, Pa
 
 @pytest.fixture
 def calibration(browser: Browser, files: dict[str, Path]) -> Iterator[Page]:
-    """A calibration's page on a phone with a finger."""
+    """Return a calibration's page on a phone with a finger."""
     context = browser.new_context(viewport={"width": 390, "height": 1600}, has_touch=True)
     context.set_default_timeout(PATIENCE)
     page = context.new_page()

@@ -28,7 +28,7 @@ def trial() -> Study:
 
 
 def taken(result: CaseResult, roll: float = 0.0) -> np.ndarray:
-    """A photograph: a small heap off the middle, uneven light, a grained table, soft, noisy, rolled [deg]."""
+    """Return a photograph: a small heap off the middle, uneven light, a grained table, rolled [deg]."""
     rng = np.random.default_rng(4)
     seen = snapshot(
         result.sphere_centers, result.sphere_radii, pixels=270, backend="raster", grains=result.sphere_grain

@@ -39,7 +39,7 @@ def trial_terms(trial: Study) -> Terms:
 
 
 def found_on(trial: Study, discovered: Discovered, verdict: Verdict) -> Discovery:
-    """A discovery with the factors of the trial study."""
+    """Return a discovery with the factors of the trial study."""
     found = discovered(verdict)
     names = tuple(factor.name for factor in trial.factors)[:2]
     drifts = tuple(replace(drift, factor=name) for drift, name in zip(found.drifts, names, strict=False))

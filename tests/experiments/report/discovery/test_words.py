@@ -14,7 +14,7 @@ Discovered = Callable[[Verdict], Discovery]
 
 
 def leaning_on(fit: Fit | None, **deviations: float) -> Fit:
-    """The fit with such uses of the allowances."""
+    """Return the fit with such uses of the allowances."""
     assert fit is not None
     uses = (CalibrationUse(name, 0.01, 0.0, 0.01 * sd, 0.0, sd) for name, sd in deviations.items())
     return replace(fit, calibration=tuple(uses))

@@ -1,4 +1,4 @@
-"""Heaps of Yade on a plate at z = 0 in its text, clump and VTK formats. Run: yade -n -x yade_heaps.py"""
+"""Heaps of Yade on a plate at z = 0 in its text, clump and VTK formats: ``yade -n -x yade_heaps.py``."""
 
 import math
 import random
