@@ -111,7 +111,7 @@ class Study(Physics):
     _under: dict[str, Study] = PrivateAttr(default_factory=dict)
     _target: Target | None = PrivateAttr(default=None)
 
-    @property
+    @cached_property
     def file(self) -> Path:
         return self._places.file
 
@@ -120,9 +120,9 @@ class Study(Physics):
         """The chosen scale; None: the study as written."""
         return self._places.scale
 
-    @property
+    @cached_property
     def document(self) -> dict[str, Any]:
-        """The study as written, the scale merged over it: plain JSON-able data."""
+        """The study as written, the scale merged over it: plain JSON-able data, a copy to be read only."""
         return copy.deepcopy(self._document)
 
     @cached_property
@@ -256,7 +256,7 @@ class Study(Physics):
     ) -> Study:
         rows = [*self.factor_sections, *tables]
         sections = validated(FactorTable, {"factor": rows}, self._places).factor
-        added, document = sections[len(self.factor_sections) :], self.document
+        added, document = sections[len(self.factor_sections) :], copy.deepcopy(self._document)
         change: dict[str, Any] = {}
         for path, middle in ((path, section.middle) for section in added for path in section.paths):
             drop(document, path)
