@@ -112,8 +112,8 @@ def compatible_region(
 ) -> Region:
     """Return the settings whose fitted mean and the measured target do not differ significantly.
 
-    A setting belongs when ``abs(mean - target) <= c sqrt(se_fit^2 + se_target^2)``, with c from the degrees of
-    freedom of both errors and their shares (``doe.samples.two_errors``). So the true setting belongs with
+    A setting belongs when ``abs(mean - target) <= c sqrt(se_fit^2 + se_target^2)``, with c from the degrees
+    of freedom of both errors and their shares (``doe.samples.two_errors``). So the true setting belongs with
     probability 1 - alpha, where the model holds: .94 to .96 for .95 with 3 measurements or more; with 2 at
     least .94, up to .98. For a surface whose terms the data chose (``doe.Surface.reduce``) the model before
     the choice counts.
