@@ -163,7 +163,10 @@ def killed_run(
         second = subprocess.run(
             [*program, *words, "--out", str(folder), "--resume"], capture_output=True, check=False
         )
-        if last.poll() is None and second.returncode != BUSY:
+        if last.poll() == BUSY:
+            # the second was faster to the lock: it has run, and the first was refused
+            last = start(words, folder)
+        elif last.poll() is None and second.returncode != BUSY:
             fault = f"a second run in the folder ended with {second.returncode}"
     fault = fault or fault_of(last, folder) or lost(before, finished_cases(folder))
     fault = fault or differing(expected, content(folder))

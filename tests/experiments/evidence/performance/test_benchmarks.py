@@ -119,7 +119,7 @@ def test_contacts_are_pairs_of_different_grains_and_walls() -> None:
 
 def test_near_is_what_may_touch_within_the_paths_of_both(small_columns: Columns) -> None:
     solver = start(small_columns.moments("settled", 1), DEVICE)
-    solver._look_ahead(2, 0)
+    solver._prepare_cycle(2, 0)
     paths = solver.neighbours.near.path.numpy()
     # all at rest: every path is the least one
     assert paths.min() == paths.max()
