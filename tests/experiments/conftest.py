@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -17,6 +18,17 @@ from dem_warp.clump_fitting import fit_clump
 from experiments.cases.forecast import speed
 from experiments.report import solid
 from experiments.studyfile import Study, load_study
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+ARGUMENTS = (
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
+)
+"""A container has no user of its own; WebGL without a GPU, the rest of a page is drawn without it."""
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "imaging")]
 
@@ -53,6 +65,17 @@ def _own_notes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(speed, "NOTES", str(tmp_path_factory.mktemp("notes") / "batches.json"))
         yield
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    """Start the installed Chromium."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=[*ARGUMENTS])
+        yield browser
+        browser.close()
 
 
 @pytest.fixture

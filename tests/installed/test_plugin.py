@@ -11,54 +11,13 @@ import pytest
 from installation import Installed, build, pip
 
 TESTS = Path(__file__).resolve().parents[1]
-STUDY = """
-name = "Magnets"
-
-[grain]
-sphere = "2 mm"
-density = "700 kg/m^3"
-shear_modulus = "10 MPa"
-poisson_ratio = 0.25
-
-[wall]
-density = "7800 kg/m^3"
-shear_modulus = "70 GPa"
-poisson_ratio = 0.3
-
-[contact.grain-grain]
-restitution = 0.2
-rolling_friction = 0.05
-
-[contact.grain-wall]
-restitution = 0.5
-static_friction = 0.4
-rolling_friction = 0.05
-
-[numerics]
-modulus_scale = 400.0
-
-[measurement]
-azimuths = 2
-pixels = 200
-
-[target]
-mean = "30 deg"
-sd = "0.5 deg"
-n = 5
-
-[[factor]]
-name = "E"
-label = "grain-grain static friction"
-parameter = "contact.grain-grain.static_friction"
-low = 0.2
-high = 0.6
-
+SMALL = (TESTS / "experiments" / "small.toml").read_text(encoding="utf-8")
+CORNERS = """
 [campaign.screening]
 design = "corners"
 
 [campaign.selection]
 at_least = 1  # two corners have no noise to compare an effect with
-
 """
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
 JAR = '[scene.jar]\ndiameter = "12 mm"\nheight = "20 mm"\ngrain_count = 10\n'
@@ -132,7 +91,7 @@ def test_its_law_and_its_scene_conform(plugged: Installed) -> None:
 
 
 def test_a_scene_is_simulated(plugged: Installed) -> None:
-    (plugged.work / "jar.toml").write_text(STUDY + JAR, encoding="utf-8")
+    (plugged.work / "jar.toml").write_text(SMALL.replace(TUBE, JAR), encoding="utf-8")
     printed = plugged.dem_warp("heap", "jar.toml", "--device", "cpu", "--out", "jar", "--json")
     heap = json.loads(printed)
     assert (heap["status"], heap["observables"]["grain_count"]) == ("finished", 10.0)
@@ -141,13 +100,13 @@ def test_a_scene_is_simulated(plugged: Installed) -> None:
 
 
 def test_a_study_is_exported(plugged: Installed) -> None:
-    (plugged.work / "leaves.toml").write_text(STUDY + TUBE, encoding="utf-8")
+    (plugged.work / "leaves.toml").write_text(SMALL, encoding="utf-8")
     plugged.dem_warp("export", "leaves.toml", "--to", "leaflet", "--approximate", "--out", "leaflet")
     assert "mu = " in (plugged.work / "leaflet" / "leaflet.txt").read_text(encoding="utf-8")
 
 
 def test_a_campaign_runs_with_its_design_on_its_engine(plugged: Installed) -> None:
-    (plugged.work / "magnets.toml").write_text(STUDY + TUBE, encoding="utf-8")
+    (plugged.work / "magnets.toml").write_text(SMALL + CORNERS, encoding="utf-8")
     words = ("calibrate", "magnets.toml", "--device", "cpu", "--engine", "cones", "--out", "out", "--json")
     found = json.loads(plugged.dem_warp(*words))
     assert found["outcome"] == "calibrated"

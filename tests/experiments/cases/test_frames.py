@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
@@ -157,28 +156,6 @@ def test_the_clean_picture_measures_to_the_same_angle(
         assert [seen["left"], seen["right"]] == pytest.approx([truth.left, truth.right], abs=0.3)
         drawn, bare = (cv2.imread(str(tmp_path / f"{name}.png")) for name in (annotated, clean))
         assert (drawn != bare).any(axis=2).mean() > 0.001
-
-
-@pytest.mark.parametrize(
-    ("options", "engine", "said"),
-    [
-        (("--movie", "avi", "--frames", "4"), "", "--movie: must be one of gif, mp4, none, got avi"),
-        (("--movie", "gif"), "", "--movie: a film is made of frames, got gif. Add --frames N."),
-        (("--frames", "1"), "", "should be greater than or equal to 2"),
-        (
-            ("--frames", "4"),
-            f"[engine]\ncommand = '{sys.executable}'\n",
-            "--frames: must run on dem-warp's own engine",
-        ),
-    ],
-)
-def test_what_cannot_be_filmed_is_refused(
-    write_study: Callable[..., Path], tmp_path: Path, options: tuple[str, ...], engine: str, said: str
-) -> None:
-    out = tmp_path / "out"
-    code, _, err = dem_warp("heap", write_study(add=engine), "--device", "cpu", *options, "--out", out)
-    assert (code, out.exists()) == (2, False)
-    assert said in " ".join(err.replace("\u2502", " ").split())
 
 
 def test_a_film_of_another_test(write_study: Callable[..., Path], tmp_path: Path) -> None:

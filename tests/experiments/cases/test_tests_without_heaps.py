@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from commandline import dem_warp
 
 from dem_warp import Drum, Interaction, WallPart
 from doe.discrepancy import Point
@@ -17,7 +16,7 @@ from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.search import Search
 from experiments.export import ExportedTest
-from experiments.io.errors import InputError, StudyError
+from experiments.io.errors import InputError
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.measured_target import with_measurements
 from experiments.measurement.measured_template import write_measured_template
@@ -106,13 +105,10 @@ def test_a_file_of_measurements_is_the_target_of_a_drum(write_study: WriteStudy,
     assert (leading.measured.mean, leading.measured.sd, leading.measured.n) == (32.0, 1.0, 3)
 
 
-def test_photographs_of_heaps_are_no_target_of_a_drum(write_study: WriteStudy, tmp_path: Path) -> None:
+def test_photographs_of_heaps_are_no_target_of_a_drum(write_study: WriteStudy) -> None:
     path = write_study((TUBE, DRUM), (ANGLE, '[target]\npictures = "photos"\n'))
     with pytest.raises(InputError, match=r"target\.pictures: .*leaves no heap.*got drum"):
         with_measurements(load_study(path))
-    code, _, said = dem_warp("calibrate", path, "--out", tmp_path / "out", "--dry-run")
-    assert code == 2
-    assert "target.pictures" in said
 
 
 SEVERAL = """
@@ -189,36 +185,6 @@ def test_a_test_with_walls_of_several_materials_leaves_for_no_other_code(drum: S
     parts = (WallPart("ends", case.scene.wall_material, case.grain_wall),)
     with pytest.raises(InputError, match="must be of one material, but ends have their own"):
         ExportedTest("a drum", type(case)(**{**vars(case), "wall_parts": parts}), "here")
-
-
-@pytest.mark.parametrize(
-    ("test", "add", "place", "rule"),
-    [
-        (DRUM, "[walls.lid]\nstatic_friction = 0.1\n", "walls.lid", "must be one of shell, ends"),
-        (TUBE, "[walls.ends]\nstatic_friction = 0.1\n", "walls.ends", "must be one of plate, tube"),
-        (DRUM, "[walls.ends]\nfriction = 0.1\n", "walls.ends.friction", "unknown key"),
-        (DRUM, "[walls.ends]\nstatic_friction = -1\n", "walls.ends.static_friction", "greater than or equal"),
-        (
-            TUBE + "plate_friction = 0.3\n",
-            "[walls.plate]\nstatic_friction = 0.1\n",
-            "walls.plate",
-            "must be left out if the plate has its own material",
-        ),
-        (DRUM + 'inclination = "95 deg"\n', "", "scene.drum.inclination", "less than 90"),
-        (DRUM + "filling = 0.9\n", "", "scene.drum.filling", "less than or equal to 0.8"),
-        (DRUM + 'picture = "top"\n', "", "scene.drum.picture", "'depth', 'silhouette' or 'end'"),
-        (DRUM + 'camera_distance = "1 m"\n', "", "scene.drum", "must be left out with the picture depth"),
-        (DRUM + 'inclination = "80 deg"\n', "", "scene.drum", "the bed at the lower end must be below"),
-    ],
-)
-def test_what_a_test_cannot_have_is_named_with_its_place(
-    write_study: WriteStudy, test: str, add: str, place: str, rule: str
-) -> None:
-    path = write_study((TUBE, test), (ANGLE, ""), add=add)
-    with pytest.raises(StudyError) as caught:
-        load_study(path)
-    assert rule in caught.value.problems[0].problem
-    assert caught.value.problems[0].place.endswith(f": {place}")
 
 
 def test_a_drum_of_a_study_has_its_options(write_study: WriteStudy) -> None:

@@ -44,60 +44,6 @@ def test_every_command_explains_itself_with_an_example(command: str) -> None:
     assert f"Example: dem-warp {command}" in " ".join(out.split())
 
 
-@pytest.mark.parametrize(
-    ("command", "old", "new", "message"),
-    [
-        ("calibrate", 'sphere = "2 mm"', "sphere = 2", "unit of length"),
-        ("heap", 'sphere = "2 mm"', 'sphere = "-2 mm"', "greater than 0"),
-        ("calibrate", "low = 0.2", "low = 0.8", "low must be below high"),
-        ("heap", "n = 5", "n = 5\nm = 6", "unknown key"),
-    ],
-)
-def test_a_wrong_study_ends_with_2_and_writes_nothing(
-    write_study: WriteStudy, command: str, old: str, new: str, message: str
-) -> None:
-    path = write_study((old, new))
-    code, out, err = dem_warp(command, path, "--device", "cpu", "--out", "results")
-    assert (code, out) == (2, "")
-    assert message in err
-    assert f"{path}:" in err
-    assert list(Path().iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["absent.toml"], "no such file"),
-        (["--scale", "bnch"], "did you mean 'bench'"),
-        (["--device", "tpu"], "--device"),
-        (["--scale", "bench", "--set", "E"], "NAME=VALUE"),
-        (["--scale", "bench", "--set", "Z=1"], "must name a factor"),
-        (["--scale", "bench", "--set", "B=34"], "unit of pressure"),
-        (["--scale", "bench", "--set", "E=-1"], "greater than or equal to 0"),
-    ],
-)
-def test_wrong_options_end_with_2_and_write_nothing(arguments: list[str], message: str) -> None:
-    code, out, err = dem_warp("heap", *arguments)
-    assert (code, out) == (2, "")
-    assert message in err
-    assert list(Path().iterdir()) == []
-
-
-def test_decisions_that_do_not_fit_the_factors_end_with_2(write_study: WriteStudy) -> None:
-    path = write_study(add="[campaign.surface]\ncenter = { E = -0.5 }\n")
-    code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
-    assert code == 2
-    assert "campaign.surface.center" in err
-    assert not Path("results").exists()
-
-
-def test_a_study_without_a_target_cannot_be_calibrated(write_study: WriteStudy) -> None:
-    path = write_study(('[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', ""))
-    code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
-    assert (code, Path("results").exists()) == (2, False)
-    assert "[target]" in err
-
-
 HOPPER = """[scene.hopper]
 diameter = "28 mm"
 fill_depth = "16 mm"
@@ -122,24 +68,6 @@ def test_another_test_than_a_heap_gives_what_it_measures(write_study: WriteStudy
     assert printed["fallen mass"] == f"{fallen:.5g} kg"
     assert kept["observable_units"]["fallen_mass"] == "kg"
     assert Path("results/snapshot.png").is_file()
-
-
-def test_an_angle_that_no_heap_has_cannot_be_calibrated(write_study: WriteStudy) -> None:
-    path = of_a_hopper(write_study)
-    path.write_text(path.read_text("utf-8") + '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', "utf-8")
-    code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
-    assert (code, Path("results").exists()) == (2, False)
-    assert "this test leaves no heap whose angle could be the target" in " ".join(err.split())
-
-
-def test_a_used_folder_is_refused(write_study: WriteStudy) -> None:
-    Path("results").mkdir()
-    Path("results/mine.txt").write_text("mine", encoding="utf-8")
-    for command in ("calibrate", "heap"):
-        code, _, err = dem_warp(command, write_study(), "--device", "cpu", "--out", "results")
-        assert code == 2
-        assert "the folder is not empty" in err
-    assert [path.name for path in Path("results").iterdir()] == ["mine.txt"]
 
 
 def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -256,26 +184,6 @@ def test_a_photograph_given_twice_has_its_rows_and_is_no_target() -> None:
     assert code == 0
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--crop", "1,2,3"), "--crop"),
-        (("--crop", "10,10,5,20"), "left < right"),
-        (("--plate", "a,b,c,d"), "--plate"),
-        (("--heap", "0"), "must be 1 or more"),
-        (("--elevation", "70"), "elevation"),
-        (("--by", "name"), "--by"),
-        (("--overlay", "a.png"), "--overlay"),
-        (("--fit", "wide"), "flank, middle"),
-    ],
-)
-def test_wrong_words_about_a_photograph_end_with_2(options: tuple[str, str], words: str) -> None:
-    save_picture("a.png", triangle())
-    code, out, err = dem_warp("angle", "a.png", *options)
-    assert (code, out) == (2, "")
-    assert words in err
-
-
 def test_a_new_study_is_written_once_and_loads() -> None:
     assert dem_warp("new", "rye")[0] == 0
     code, _, err = dem_warp("new", "rye")
@@ -298,15 +206,6 @@ def test_a_clump_is_made_written_and_described() -> None:
     # The file holds nine decimals of a millimetre.
     assert json.loads(out)["volume_mm3"] == pytest.approx(fitted["volume_mm3"], rel=1e-7)
     assert dem_warp(*solid, "--out", "grain.txt")[0] == 2
-
-
-@pytest.mark.parametrize(
-    "arguments", [["sphere:2"], ["cube:2", "--spheres", "3"], ["grain.stl", "--spheres", "3"], ["grain.txt"]]
-)
-def test_a_wrong_shape_ends_with_2(arguments: list[str]) -> None:
-    code, out, err = dem_warp("clump", *arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("Error: ")
 
 
 @pytest.mark.parametrize(

@@ -109,9 +109,3 @@ def test_a_clump_is_drawn_with_its_solid_and_never_over_a_file() -> None:
         assert (code, rule in err) == (2, True)
     assert Path("die.png").read_bytes() == picture
     assert sorted(path.name for path in Path().iterdir()) == ["die.png", "die.stl"]
-
-
-def test_a_missing_file_is_named() -> None:
-    code, out, err = dem_warp("clump", "nosuch.stl", "--spheres", 3)
-    assert (code, out) == (2, "")
-    assert "nosuch.stl: no such file" in err

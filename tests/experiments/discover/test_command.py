@@ -38,35 +38,6 @@ def discover(*arguments: object, device: str = "cpu") -> tuple[int, str, str]:
     return result.exit_code, result.stdout, result.stderr
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("condition,replicate,observable,value\nslow,1,height,0.01\n", "must be a condition of the study"),
-        ("condition,replicate,observable,value\nbase,1,height,40\n", "row 2"),
-    ],
-)
-def test_data_that_cannot_be_right_end_with_code_2_and_leave_nothing(
-    tmp_path: Path, text: str, said: str
-) -> None:
-    data = tmp_path / "measured.csv"
-    data.write_text(text, encoding="utf-8")
-    code, out, err = discover(data, "--out", tmp_path / "out")
-    assert code == 2
-    assert out == ""
-    assert "measured.csv" in err
-    assert said in err or "measured.csv:2" in err
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_search_on_photographs_needs_what_they_show(tmp_path: Path) -> None:
-    data = tmp_path / "measured.csv"
-    data.write_text("condition,replicate,observable,value,unit\nbase,1,t75,400,ms\n", encoding="utf-8")
-    code, _, err = discover(data, "--photographs-only", "--out", tmp_path / "out", "--dry-run")
-    assert code == 2
-    assert "measured.csv: --photographs-only needs an observable that photographs show" in err
-    assert "got t75" in err
-
-
 def test_a_search_builds_its_study_and_each_condition_when_a_file_is_read_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -82,22 +53,6 @@ def test_a_search_builds_its_study_and_each_condition_when_a_file_is_read_alone(
     code, _, err = discover(data, "--dry-run")
     assert code == 0, err
     assert 0 < len(built) <= 12
-
-
-def test_a_folder_in_use_is_never_written_to(tmp_path: Path) -> None:
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "mine.txt").write_text("kept", encoding="utf-8")
-    code, _, err = discover(DATA / "nothing-missing.csv", "--out", tmp_path / "out")
-    assert code == 2
-    assert "the folder is not empty. Add --resume" in err
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine.txt"]
-
-
-def test_a_file_that_is_no_bank_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
-    code, _, err = discover(DATA / "nothing-missing.csv", "--bank", STUDY, "--out", tmp_path / "out")
-    assert code == 2
-    assert "must be a bank" in err
-    assert not (tmp_path / "out").exists()
 
 
 def test_heaps_that_lack_nothing_raise_no_alarm_with_photographs_only(tmp_path: Path) -> None:

@@ -63,9 +63,6 @@ def exported(laws: str, shape: ClumpShape | ShapeMixture = ROD, **changes: objec
     return ExportedTest("small", case, "a test")
 
 
-# ---- templates of grains, seeds, walls ---------------------------------------------------------------------
-
-
 def test_classes_of_size_have_the_populations_moments() -> None:
     sizes, parts = np.array(size_classes(1.1, 0.2)).T
     assert parts.sum() == pytest.approx(1.0, rel=1e-12)
@@ -105,9 +102,6 @@ def test_meshes_close_around_the_tube_and_have_the_plates_area() -> None:
     sides = round_plate[:, 1:] - round_plate[:, :1]
     area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum()
     assert area == pytest.approx(math.pi * 0.02**2, rel=1e-12)
-
-
-# ---- inputs ------------------------------------------------------------------------------------------------
 
 
 def test_liggghts_gets_laws_masses_and_seeds() -> None:
@@ -235,9 +229,6 @@ def test_terms_of_a_case_are_there_for_every_code_and_set_of_laws(name: str) -> 
     assert warned
 
 
-# ---- what is refused ---------------------------------------------------------------------------------------
-
-
 def test_a_law_that_the_code_lacks_is_refused_or_told_at_the_top(tmp_path: Path) -> None:
     test = exported("edem")
     with pytest.raises(InputError, match=r"law rolling = 'own_spin': LIGGGHTS lacks it; using 'cdt'"):
@@ -269,9 +260,6 @@ def test_another_test_and_another_code_are_refused() -> None:
         export_input(exported("edem"), "fluent")
 
 
-# ---- the command -------------------------------------------------------------------------------------------
-
-
 def test_the_command_writes_the_folder_and_refuses_with_exit_code_2(tmp_path: Path) -> None:
     run: Callable = CliRunner().invoke
     refused = run(app, ["export", "--scale", "bench", "--to", "lammps", "--out", str(tmp_path / "no")])
@@ -291,9 +279,6 @@ def test_a_card_without_its_test_is_refused(tmp_path: Path) -> None:
     card.write_text("[material.grain]\nsphere = '1 mm'\n", encoding="utf-8")
     with pytest.raises(StudyError, match="lacks the test that it was fitted to"):
         load_card(card)
-
-
-# ---- the real codes ----------------------------------------------------------------------------------------
 
 
 @with_programs

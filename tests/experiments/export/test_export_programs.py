@@ -177,9 +177,6 @@ def test_mercury_gets_every_number_that_its_driver_asks_for() -> None:
     assert asked <= written
 
 
-# ---- the course of the test, which the programs have in themselves ----------------------
-
-
 @pytest.fixture
 def course(tmp_path: Any, monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Translation]) -> Any:
     """Return a course as a program has it, of a tube that is filled to its rim."""

@@ -204,9 +204,6 @@ def test_bad_counts_are_refused_with_their_row(tmp_path: Path, text: str, messag
         read_counts(table(tmp_path, text), "mm")
 
 
-# ---- diameters of a shape ----------------------------------------------------------------------------------
-
-
 def rod(spheres: int, step: float = 0.5, radius: float = 1.0) -> ClumpShape:
     centers = np.zeros((spheres, 3))
     centers[:, 0] = step * np.arange(spheres)
@@ -236,8 +233,6 @@ def test_a_flat_grain_passes_across_the_diagonal() -> None:
     shape = ClumpShape.from_spheres(centers, [radius] * 4)
     assert sieve_diameter(shape) == pytest.approx(side / np.sqrt(2.0) + 2.0 * radius, rel=1e-3)
 
-
-# ---- in a study --------------------------------------------------------------------------------------------
 
 SECTION = """[grain.sizes]
 distribution = "lognormal"
@@ -299,34 +294,6 @@ high = "4 mm"
         study.case({"D": value}, seed=1).grains.mixture.shapes[0].radii[0] for value in (3.0, 4.0)
     )
     assert large / small == pytest.approx(4.0 / 3.0, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "rule"),
-    [
-        ('by = "volume"', "", "a distribution needs by"),
-        ("geometric_sd = 1.2", "", "a lognormal distribution needs geometric_sd"),
-        ("geometric_sd = 1.2", "geometric_sd = 0.9", "geometric_sd: must be greater than 1"),
-        ("geometric_sd = 1.2", 'geometric_sd = 1.2\nsd = "1 mm"', "distribution must not have sd"),
-        ('distribution = "lognormal"', 'distribution = "log"', "distribution: must be 'normal', 'lognormal'"),
-        ('distribution = "lognormal"', 'counts = "none.csv"', "no such file"),
-        ("[grain.sizes]", "size_sd = 0.1\n[grain.sizes]", "must have sizes .* or size_sd, not both"),
-        ('by = "volume"', 'by = "volume"\ncut = [0.9, 0.1]', "cut must rise, got 0.9 and 0.1"),
-        ('by = "volume"', 'by = "volume"\nclasses = 0', "classes: must be greater than or equal to 1"),
-    ],
-)
-def test_bad_sizes_are_refused_with_their_place(
-    write_study: WriteStudy, old: str, new: str, rule: str
-) -> None:
-    with pytest.raises(StudyError, match=rule) as caught:
-        load_study(with_sizes(write_study, SECTION.replace(old, new)))
-    assert "small.toml" in caught.value.problems[0].place
-
-
-def test_a_normal_distribution_that_reaches_zero_is_refused(write_study: WriteStudy) -> None:
-    section = '[grain.sizes]\ndistribution = "normal"\nmean = "3 mm"\nsd = "2 mm"\nby = "number"\n'
-    with pytest.raises(StudyError, match=r"the sizes at the lower cut, 0.01, must be positive: raise it"):
-        load_study(with_sizes(write_study, section))
 
 
 def test_a_wrong_table_is_named_by_the_study_and_by_its_row(write_study: WriteStudy, tmp_path: Path) -> None:

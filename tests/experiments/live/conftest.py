@@ -22,8 +22,6 @@ from experiments.studyfile import Study
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from browser import Browser
-
 NAME, KEY, OTHER = "a" * 64, "b" * 64, "c" * 64
 """Name of a case that runs; keys of two cases that have been planned."""
 
@@ -74,11 +72,3 @@ def served() -> Iterator[Callable[[Path], Place]]:
             return place
 
         yield serve
-
-
-@pytest.fixture(scope="session")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """Start one browser for all tests of pages."""
-    browser = Browser(tmp_path_factory.mktemp("profile"))
-    yield browser
-    browser.close()

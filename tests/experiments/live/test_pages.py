@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import trimesh
-from browser import Browser, browsing
 from conftest import OTHER, begin, photograph
+from playwright.sync_api import Browser, Page
 
 from dem_warp import Case, CaseResult, Progress
 from experiments import api
@@ -29,6 +29,9 @@ pytestmark = pytest.mark.program("chromium")
 
 Cone = Callable[..., CaseResult]
 Serve = Callable[[Path], Place]
+
+PATIENCE = 90_000
+"""Longest wait for what a page should show [ms]; a machine may be busy."""
 
 PAINTED = """[...document.querySelectorAll('canvas')].filter((canvas) => canvas.width && canvas
   .getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value)).length"""
@@ -64,16 +67,43 @@ UNNAMED = """[...document.querySelectorAll('input, select, textarea, button, can
 """Controls and pictures without a name for who cannot see them."""
 
 
-def check(browser: Browser, place: Place) -> None:
+@contextmanager
+def browsing(chromium: Browser, url: str) -> Iterator[Page]:
+    """Open a page that notes its errors and the addresses that it asks for."""
+    page = chromium.new_page(viewport={"width": 1280, "height": 900})
+    page.set_default_timeout(PATIENCE)
+    page.errors, page.asked = [], []
+    page.on(
+        "console", lambda said: page.errors.append(said.text) if said.type in ("error", "assert") else None
+    )
+    page.on("pageerror", lambda error: page.errors.append(str(error)))
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.goto(url)
+    yield page
+    page.close()
+
+
+def wait(page: Page, condition: str) -> None:
+    """Wait until an expression is true in the page; what a page does not have yet throws."""
+    page.wait_for_function(f"() => {{ try {{ return Boolean({condition}); }} catch {{ return false; }} }}")
+
+
+def look(page: Page, width: int, dark: bool) -> None:
+    """Show a page with a width, light or dark."""
+    page.set_viewport_size({"width": width, "height": 900})
+    page.emulate_media(color_scheme="dark" if dark else "light")
+
+
+def check(page: Page, place: Place) -> None:
     """See that a page has no error, nothing from elsewhere, a name for everything, and room for all."""
-    assert browser.errors == []
+    assert page.errors == []
     home = f"http://127.0.0.1:{place.port}/{place.token}/"
-    assert [each for each in browser.asked if not each.startswith((home, "data:", "blob:"))] == []
-    assert browser.run("document.documentElement.scrollWidth - innerWidth") <= 0
-    assert browser.run(UNNAMED) == []
-    assert browser.run(FAINT) == []
-    assert browser.run("document.querySelectorAll('h1').length") == 1
-    assert browser.run("document.documentElement.lang") == "en"
+    assert [each for each in page.asked if not each.startswith((home, "data:", "blob:"))] == []
+    assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
+    assert page.evaluate(UNNAMED) == []
+    assert page.evaluate(FAINT) == []
+    assert page.evaluate("document.querySelectorAll('h1').length") == 1
+    assert page.evaluate("document.documentElement.lang") == "en"
 
 
 LOOKS = [(1280, False), (1280, True), (390, False), (390, True)]
@@ -89,30 +119,30 @@ def test_a_run_is_shown_as_it_goes(
         note(Progress(0, 2, 0.0, {"lift": 1}, 0.0))
         journal._noted = 0.0
         note(Progress(1, 2, 0.5, {"lift": 1}, 30.0))
-        browser = stack.enter_context(browsing(chromium, place.url))
-        browser.wait(f"{PAINTED} === 2")
-        shown = browser.run("document.body.innerText")
+        page = stack.enter_context(browsing(chromium, place.url))
+        wait(page, f"{PAINTED} === 2")
+        shown = page.evaluate("document.body.innerText")
         assert "30 s left, 50 %, 1 of 2 cases, 1 lift" in shown
         assert "screening, run 2, replicate 1" in shown
         assert "lift, 40 %" in shown
         assert "at rest, 26.5°" in shown
         assert "The run begins." in shown
-        assert browser.run("document.querySelector('#state').textContent") == "running"
-        browser.wait("document.querySelector('.chart .scatterlayer .point')")
+        assert page.evaluate("document.querySelector('#state').textContent") == "running"
+        wait(page, "document.querySelector('.chart .scatterlayer .point')")
         for width, dark in LOOKS:
-            browser.look(width, dark)
+            look(page, width, dark)
             dark_page = "getComputedStyle(document.body).backgroundColor === 'rgb(18, 22, 28)'"
-            browser.wait(f"({dark_page}) === {str(dark).lower()}")
-            check(browser, place)
+            wait(page, f"({dark_page}) === {str(dark).lower()}")
+            check(page, place)
         # what happens is seen without loading the page anew
         Store(run_folder / "cases").save(OTHER, cone(0.6))
         journal.ended(OTHER, {"status": "finished", "reason": "", "angle": 31.25, "angle_se": 0.5})
-        browser.wait("document.body.innerText.includes('at rest, 31.3°')")
-        browser.wait(f"{PAINTED} === 2")
-        browser.wait("document.querySelectorAll('#cases tbody tr').length === 2")
+        wait(page, "document.body.innerText.includes('at rest, 31.3°')")
+        wait(page, f"{PAINTED} === 2")
+        wait(page, "document.querySelectorAll('#cases tbody tr').length === 2")
         journal.__exit__(None, None, None)
-        browser.wait("document.querySelector('#state').textContent === 'finished'")
-        check(browser, place)
+        wait(page, "document.querySelector('#state').textContent === 'finished'")
+        check(page, place)
 
 
 @pytest.mark.parametrize("ending", ["killed", "failed"])
@@ -127,12 +157,12 @@ def test_a_run_that_was_broken_off_is_shown(
         journal._ended.set()
         monkeypatch.setattr("experiments.live.run_state.STALE", -1.0)
     place = served(run_folder)
-    with browsing(chromium, place.url) as browser:
-        browser.wait(f"{PAINTED} === 2")
-        shown = browser.run("document.body.innerText")
+    with browsing(chromium, place.url) as page:
+        wait(page, f"{PAINTED} === 2")
+        shown = page.evaluate("document.body.innerText")
         assert "last seen: lift, 40 %" in shown
         assert ("The run failed: the disk is full" if ending == "failed" else "No sign of life") in shown
-        check(browser, place)
+        check(page, place)
 
 
 def test_a_finished_calibration_is_shown_with_its_report(
@@ -155,23 +185,24 @@ def test_a_finished_calibration_is_shown_with_its_report(
     folder = tmp_path / "out"
     found = api.calibrate(small_study.file, folder, device="cpu").campaign
     place = served(folder)
-    with browsing(chromium, place.url) as browser:
-        browser.wait(f"{PAINTED} === 12")
+    with browsing(chromium, place.url) as page:
+        wait(page, f"{PAINTED} === 12")
         for decision in found.decisions:
-            assert decision.outcome in browser.run("document.querySelector('#stages').innerText")
-        assert browser.run("document.querySelectorAll('#cases tbody tr').length") == len(found.cases)
-        assert browser.run("document.querySelectorAll('.chart').length") == len(
+            assert decision.outcome in page.evaluate("document.querySelector('#stages').innerText")
+        assert page.evaluate("document.querySelectorAll('#cases tbody tr').length") == len(found.cases)
+        assert page.evaluate("document.querySelectorAll('.chart').length") == len(
             charts_of(RunState.read(folder))
         )
         # every chart has all of its room, and no more
-        browser.wait(
+        wait(
+            page,
             "[...document.querySelectorAll('.chart')].every((chart) => "
-            "Math.abs(chart.clientWidth - chart.querySelector('svg').clientWidth) < 2)"
+            "Math.abs(chart.clientWidth - chart.querySelector('svg').clientWidth) < 2)",
         )
-        check(browser, place)
-    with browsing(chromium, f"{place.url}file/report.html") as browser:
-        browser.wait("document.querySelector('h1')")
-        assert browser.errors == []
+        check(page, place)
+    with browsing(chromium, f"{place.url}file/report.html") as page:
+        wait(page, "document.querySelector('h1')")
+        assert page.errors == []
 
 
 def test_the_page_of_a_run_shows_its_end(
@@ -184,26 +215,23 @@ def test_the_page_of_a_run_shows_its_end(
         assert live is None
         journal = begin(run_folder, small_study, cone)
         [line] = said
-        browser = stack.enter_context(browsing(chromium, line.removeprefix("Live: ")))
-        browser.wait("document.querySelector('#state').textContent === 'running'")
+        page = stack.enter_context(browsing(chromium, line.removeprefix("Live: ")))
+        wait(page, "document.querySelector('#state').textContent === 'running'")
         journal.__exit__(None, None, None)
-        browser.wait("document.querySelector('#state').textContent === 'finished'")
-        assert browser.errors == []
+        wait(page, "document.querySelector('#state').textContent === 'finished'")
+        assert page.errors == []
 
 
 def test_a_heap_turns_by_the_arrow_keys(
     run_folder: Path, small_study: Study, cone: Cone, served: Serve, chromium: Browser
 ) -> None:
     begin(run_folder, small_study, cone)
-    with browsing(chromium, served(run_folder).url) as browser:
-        browser.wait(f"{PAINTED} === 2")
+    with browsing(chromium, served(run_folder).url) as page:
+        wait(page, f"{PAINTED} === 2")
         picture = "document.querySelector('canvas').toDataURL()"
-        before = browser.run(picture)
-        browser.run("document.querySelector('canvas').focus()")
-        assert browser.run("document.activeElement.tagName") == "CANVAS"
-        for name in ("keyDown", "keyUp"):
-            browser.call("Input.dispatchKeyEvent", type=name, key="ArrowLeft", code="ArrowLeft")
-        browser.wait(f"{picture} !== {before!r}")
+        before = page.evaluate(picture)
+        page.locator("canvas").first.press("ArrowLeft")
+        wait(page, f"{picture} !== {before!r}")
 
 
 @pytest.fixture
@@ -221,11 +249,11 @@ READY = "document.documentElement.dataset.ready"
 
 def test_the_start_page_is_readable_and_fits(start_page: tuple[Place, Path], chromium: Browser) -> None:
     place, _ = start_page
-    with browsing(chromium, place.url) as browser:
-        browser.wait(READY)
+    with browsing(chromium, place.url) as page:
+        wait(page, READY)
         for width, dark in LOOKS:
-            browser.look(width, dark)
-            check(browser, place)
+            look(page, width, dark)
+            check(page, place)
 
 
 @pytest.mark.usefixtures("_coarse_clumps")
@@ -236,45 +264,47 @@ def test_from_an_stl_to_a_heap_in_the_browser(
     place, folder = start_page
     stl = tmp_path / "grain.stl"
     trimesh.creation.capsule(height=2.0, radius=1.5, count=(16, 16)).export(stl)
-    with browsing(chromium, place.url) as browser:
-        browser.wait(READY)
-        browser.fill("#name", "rye")
-        browser.click("input[value=file]")
-        browser.choose_files("#mesh", stl)
-        browser.fill("#spheres", "2")
-        browser.click("#preview")
-        browser.wait(f"{PAINTED} === 2")
-        assert "2 spheres, volume" in browser.run("document.querySelector('#clump-words').innerText")
-        command = browser.run("document.querySelector('#clump-command').innerText")
+    with browsing(chromium, place.url) as page:
+        wait(page, READY)
+        page.fill("#name", "rye")
+        page.click("input[value=file]")
+        page.set_input_files("#mesh", stl)
+        page.fill("#spheres", "2")
+        page.click("#preview")
+        wait(page, f"{PAINTED} === 2")
+        assert "2 spheres, volume" in page.evaluate("document.querySelector('#clump-words').innerText")
+        command = page.evaluate("document.querySelector('#clump-command').innerText")
         assert command.startswith("dem-warp clump grain.stl --spheres 2 --protrusion auto")
         # a wrong value gets the message of the command line
-        browser.fill("[data-place='grain.density']", "heavy")
-        browser.click("#draft")
-        browser.wait("document.querySelector('#draft-error').innerText.includes('rye.toml')")
-        assert "got 'heavy'" in browser.run("document.querySelector('#draft-error').innerText")
-        browser.fill("[data-place='grain.density']", "1200 kg/m^3")
+        page.fill("[data-place='grain.density']", "heavy")
+        page.click("#draft")
+        wait(page, "document.querySelector('#draft-error').innerText.includes('rye.toml')")
+        assert "got 'heavy'" in page.evaluate("document.querySelector('#draft-error').innerText")
+        page.fill("[data-place='grain.density']", "1200 kg/m^3")
+        page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
         settings = {"diameter": "28 mm", "height": "28 mm", "grain_count": "30"}
         for key, value in settings.items():
-            browser.fill(f"[data-place='scene.lifted-cylinder.{key}']", value)
-        browser.fill("[data-place='numerics.modulus_scale']", "400")
-        browser.click("#draft")
-        browser.wait("document.querySelector('#text').value.includes('1200 kg/m^3')")
-        browser.click("#write")
-        browser.wait("document.querySelector('#written').innerText === 'Wrote rye.toml.'")
+            page.fill(f"[data-place='scene.lifted-cylinder.{key}']", value)
+        page.fill("[data-place='numerics.modulus_scale']", "400")
+        page.click("#draft")
+        wait(page, "document.querySelector('#text').value.includes('1200 kg/m^3')")
+        page.click("#write")
+        wait(page, "document.querySelector('#written').innerText === 'Wrote rye.toml.'")
         study = load_study(folder / "rye.toml")
         assert study.case({}, seed=1).grains.shape.sphere_count == 2
-        browser.fill("#command", "heap")
-        browser.fill("#device", "cpu")
+        page.select_option("#command", "heap")
+        page.fill("#device", "cpu")
+        page.press("#device", "Tab")
         command = "dem-warp heap rye.toml --out out/rye-heap-1 --device cpu"
-        browser.wait(f"document.querySelector('#run-command').innerText === {command!r}")
-        browser.click("#start")
-        browser.wait("document.querySelector('#runs .badge.finished')")
-        check(browser, place)
-        link = browser.run("document.querySelector('#runs a').href")
-        browser.open(link)
-        browser.wait(f"{PAINTED} === 1")
-        assert browser.run("document.querySelector('h1').innerText") == "rye"
-        check(browser, place)
+        wait(page, f"document.querySelector('#run-command').innerText === {command!r}")
+        page.click("#start")
+        wait(page, "document.querySelector('#runs .badge.finished')")
+        check(page, place)
+        link = page.evaluate("document.querySelector('#runs a').href")
+        page.goto(link)
+        wait(page, f"{PAINTED} === 1")
+        assert page.evaluate("document.querySelector('h1').innerText") == "rye"
+        check(page, place)
     assert (folder / "out" / "rye-heap-1" / "heap.vtp").is_file()
 
 
@@ -285,14 +315,16 @@ def test_photographs_become_the_target(
     pictures = [tmp_path / f"{number}.png" for number in range(3)]
     for path, slope in zip(pictures, (0.5, 0.55, 0.6), strict=True):
         path.write_bytes(photograph(slope))
-    with browsing(chromium, place.url) as browser:
-        browser.wait(READY)
-        browser.click("input[value=pictures]")
-        browser.choose_files("#photos", *pictures)
-        browser.click("#measure")
-        browser.wait("document.querySelectorAll('#angles tbody tr').length === 3")
-        assert browser.run("document.querySelector('#angles-command').innerText").startswith("dem-warp angle")
-        browser.click("#draft")
-        browser.wait("document.querySelector('#text').value.includes('pictures = \"mygrain-photos\"')")
-        check(browser, place)
+    with browsing(chromium, place.url) as page:
+        wait(page, READY)
+        page.click("input[value=pictures]")
+        page.set_input_files("#photos", pictures)
+        page.click("#measure")
+        wait(page, "document.querySelectorAll('#angles tbody tr').length === 3")
+        assert page.evaluate("document.querySelector('#angles-command').innerText").startswith(
+            "dem-warp angle"
+        )
+        page.click("#draft")
+        wait(page, "document.querySelector('#text').value.includes('pictures = \"mygrain-photos\"')")
+        check(page, place)
     assert len(list((folder / "mygrain-photos").iterdir())) == 3

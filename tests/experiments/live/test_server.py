@@ -177,13 +177,6 @@ def test_a_missing_library_is_reported_with_the_command_that_installs_it(
     assert not (tmp_path / "h").exists()
 
 
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    for command in ("watch", "ui"):
-        code, _, shown = dem_warp(command, tmp_path / "none")
-        assert code == 2
-        assert "no such folder" in shown
-
-
 def test_the_address_is_reported_and_no_browser_opened_without_a_screen(
     monkeypatch: pytest.MonkeyPatch, run_folder: Path
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page
 
 from dem_warp import CaseResult
 from doe.discrepancy import Settings, Verdict
@@ -22,9 +21,6 @@ from experiments.report.kit.theme import DARK, LIGHT
 from experiments.studyfile import Study, load_study
 
 pytestmark = pytest.mark.program("chromium")
-
-ARGUMENTS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing")
-"""WebGL without a GPU; the rest of the page is drawn without it, at half the work."""
 
 PATIENCE = 240_000
 """Milliseconds that a page may take where a dozen processes share a core and WebGL is drawn in software."""
@@ -52,25 +48,6 @@ class Opened:
     width: int
     scheme: str
     said: list[str] = field(default_factory=list)
-
-
-@pytest.fixture(scope="module")
-def driver() -> Iterator[Playwright]:
-    with sync_playwright() as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def browser(driver: Playwright) -> Iterator[Browser]:
-    started = launched(driver, *ARGUMENTS)
-    yield started
-    started.close()
-
-
-def launched(driver: Playwright, *arguments: str) -> Browser:
-    """Start the installed Chromium; a container has no user of its own."""
-    program = shutil.which("chromium")
-    return driver.chromium.launch(executable_path=program, args=["--no-sandbox", *arguments])
 
 
 def small_heap() -> SolidHeap:
@@ -139,17 +116,17 @@ def read_through(context: BrowserContext, file: Path, width: int, scheme: str) -
     params=[(name, *shown) for name in ("calibration", "search") for shown in SHOWN],
     ids=lambda shown: "-".join(map(str, shown)),
 )
-def opened(request: pytest.FixtureRequest, browser: Browser, files: dict[str, Path]) -> Iterator[Opened]:
+def opened(request: pytest.FixtureRequest, chromium: Browser, files: dict[str, Path]) -> Iterator[Opened]:
     name, width, scheme = request.param
-    context = browser.new_context(viewport={"width": width, "height": 1600}, color_scheme=scheme)
+    context = chromium.new_context(viewport={"width": width, "height": 1600}, color_scheme=scheme)
     yield read_through(context, files[name], width, scheme)
     context.close()
 
 
 @pytest.fixture
-def calibration(browser: Browser, files: dict[str, Path]) -> Iterator[Page]:
+def calibration(chromium: Browser, files: dict[str, Path]) -> Iterator[Page]:
     """Return a calibration's page on a phone with a finger."""
-    context = browser.new_context(viewport={"width": 390, "height": 1600}, has_touch=True)
+    context = chromium.new_context(viewport={"width": 390, "height": 1600}, has_touch=True)
     context.set_default_timeout(PATIENCE)
     page = context.new_page()
     page.goto(files["calibration"].as_uri())

@@ -9,33 +9,12 @@ from pathlib import Path
 import pytest
 
 from experiments.calibrate import Campaign
-from experiments.io.errors import StudyError
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.reserved_names import RESERVED
 
 
 def with_factor(write_study: Callable[..., Path], name: str) -> Study:
     return load_study(write_study(('name = "E"', f'name = "{name}"')))
-
-
-@pytest.mark.parametrize("name", ["seed", "case_key", "solid_fraction", "height", "angle_1", "dummy2"])
-def test_a_factor_cannot_have_the_name_of_a_column(write_study: Callable[..., Path], name: str) -> None:
-    with pytest.raises(StudyError, match=rf"factor\[1\]\.name: is a column .*'{name}'"):
-        with_factor(write_study, name)
-
-
-def test_a_factor_cannot_have_the_name_of_a_response_or_of_a_coded_factor(
-    write_study: Callable[..., Path],
-) -> None:
-    further = '[[response]]\nobservable = "solid_fraction"\nname = "packing"\nmean = 0.6\nsd = 0.01\nn = 3\n'
-    with pytest.raises(StudyError, match="is a column"):
-        load_study(write_study(('name = "E"', 'name = "packing"'), add=further))
-    second = (
-        '[[factor]]\nname = "E_coded"\nlabel = "rolling"\nparameter = "contact.grain-wall.static_friction"\n'
-        "low = 0.1\nhigh = 0.3\n"
-    )
-    with pytest.raises(StudyError, match=r"factor\[2\]\.name: is a column"):
-        load_study(write_study(("static_friction = 0.4\n", ""), add=second))
 
 
 @pytest.mark.parametrize("name", ["E", "mu_2", "Seed"])

@@ -64,26 +64,6 @@ def test_what_a_condition_fixes_no_factor_varies_there(write_study: WriteStudy) 
         study.under("known").case({"X": 0.3}, 5)
 
 
-@pytest.mark.parametrize(
-    ("added", "rule", "key"),
-    [
-        ('scene.lifted-cylinder.lift_sped = "1 m/s"', "did you mean 'lift_speed'", "lift_sped"),
-        ('scene.lifted-cylinder.lift_speed = "1 mm"', "needs a unit of speed", "lift_speed"),
-        ("held_outt = true", "did you mean 'held_out'", "held_outt"),
-        ("numerics = 3.0", "unknown key", "numerics"),
-    ],
-)
-def test_a_wrong_condition_is_named_with_its_line(
-    write_study: WriteStudy, added: str, rule: str, key: str
-) -> None:
-    path = write_study(add=f"\n[condition.base]\n\n[condition.odd]\n{added}\n")
-    line = len(path.read_text(encoding="utf-8").splitlines())
-    with pytest.raises(StudyError, match=rule) as caught:
-        load_study(path)
-    assert caught.value.place.startswith(f"{path}:{line}: condition.odd.")
-    assert key in caught.value.place
-
-
 def test_a_factor_may_have_several_places(write_study: WriteStudy) -> None:
     both = '["contact.grain-grain.static_friction", "contact.grain-wall.static_friction"]'
     study = load_study(

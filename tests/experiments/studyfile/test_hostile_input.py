@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +11,10 @@ import pytest
 from commandline import dem_warp
 
 SMALL_STUDY = (Path(__file__).parents[1] / "small.toml").read_text(encoding="utf-8")
+TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
+HOPPER = '[scene.hopper]\ndiameter = "28 mm"\nfill_depth = "16 mm"\noutlet = "20 mm"\n'
+ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
+HEAPS = Path(__file__).parents[1] / "grains" / "spheres" / "data"
 LONGEST_MESSAGE = 2500
 """Characters: a message is read, whatever came in."""
 CONDITIONS = "\n[condition.base]\n\n[condition.fast]\nscene.lifted-cylinder.lift_speed = '0.2 m/s'\n"
@@ -42,6 +47,21 @@ class Hostile:
     files: Mapping[str, str | bytes] = field(default_factory=dict)
 
 
+def small(command: str, *words: str, add: str = "") -> Hostile:
+    """Give a command the small study, with some text added."""
+    return Hostile(command, words, {"s.toml": SMALL_STUDY + add})
+
+
+def content(text: str | bytes, *words: str) -> Hostile:
+    """Make a study file of something else."""
+    return Hostile("heap s.toml --device cpu --out o", words, {"s.toml": text})
+
+
+def picture(option: str, *words: str) -> Hostile:
+    """Measure a picture with an option that is wrong."""
+    return Hostile(f"angle p.jpg {option}", words, {"p.jpg": "x"})
+
+
 def study(command: str, old: str, new: str, *words: str) -> Hostile:
     """Make a study file with one thing wrong."""
     assert SMALL_STUDY.count(old) == 1, old
@@ -61,25 +81,13 @@ def clump(text: str | bytes, *words: str, options: str = "", name: str = "g.txt"
 
 HOSTILE = {
     # Study files
-    "no study": Hostile(
-        "heap none.toml --device cpu --out o", ("none.toml", "no such file")
-    ),
+    "no study": Hostile("heap none.toml --device cpu --out o", ("none.toml", "no such file")),
     "a folder": Hostile("heap . --device cpu --out o", ("regular file", "folder")),
-    "empty study": Hostile(
-        "heap s.toml --device cpu --out o", ("s.toml", "required", "nothing"), {"s.toml": ""}
-    ),
-    "no TOML": Hostile(
-        "heap s.toml --device cpu", ("s.toml:1", "valid TOML", "hello"), {"s.toml": "hello\n"}
-    ),
-    "UTF-16": Hostile(
-        "heap s.toml --device cpu", ("s.toml", "UTF-8", "UTF-16"), {"s.toml": SMALL_STUDY.encode("utf-16")}
-    ),
-    "Latin-1": Hostile(
-        "heap s.toml --device cpu", ("s.toml, line 1", "UTF-8", "0xfc"), {"s.toml": b"name = 'K\xfcrbis'\n"}
-    ),
-    "a picture as study": Hostile(
-        "heap s.toml --device cpu", ("s.toml", "UTF-8", "binary"), {"s.toml": bytes(range(256)) * 40}
-    ),
+    "empty study": content("", "s.toml", "required", "nothing"),
+    "no TOML": content("hello\n", "s.toml:1", "valid TOML", "hello"),
+    "UTF-16": content(SMALL_STUDY.encode("utf-16"), "s.toml", "UTF-8", "UTF-16"),
+    "Latin-1": content(b"name = 'K\xfcrbis'\n", "s.toml, line 1", "UTF-8", "0xfc"),
+    "a picture as study": content(bytes(range(256)) * 40, "s.toml", "UTF-8", "binary"),
     "decimal comma": study("heap", '"28 mm"\nheight', '"28,5 mm"\nheight', "s.toml:25", "28.5 mm", "comma"),
     "no unit": study("heap", '"28 mm"\nheight', "28\nheight", "s.toml:25: scene", "unit of length", "28"),
     "true for a count": study("heap", "= 30", "= true", "grain_count", "not true or false", "True"),
@@ -89,22 +97,28 @@ HOSTILE = {
         "heap", 'name = "Small"', f'nome = "{"x" * 2_000_000}"', "nome", "unknown key"
     ),
     "escape sequences": study("heap", 'name = "Small"', 'nome = "\\u001b[2J"', "nome", "unknown key"),
+    "an unknown key": study("heap", "n = 5", "n = 5\nm = 6", "s.toml:40: target.m", "unknown key"),
+    "a negative length": study(
+        "heap", 'sphere = "2 mm"', 'sphere = "-2 mm"', "grain.sphere", "greater than 0"
+    ),
+    "a range reversed": study("calibrate", "low = 0.2", "low = 0.8", "low must be below high"),
+    "no target": study("calibrate", ANGLE, "", "[target]"),
+    "an angle that no heap has": study(
+        "calibrate", TUBE, HOPPER, "this test leaves no heap whose angle could be the target"
+    ),
+    "a start beyond a limit": small(
+        "calibrate s.toml --device cpu", "campaign.surface.center",
+        add="[campaign.surface]\ncenter = { E = -0.5 }\n"
+    ),
+    "no room for the rain": study(
+        "calibrate --dry-run", "= 30", '= 30\nrain_rate = "1e12 1/s"', "no free place for the rain"
+    ),
     # Options
-    "unknown scale": Hostile(
-        "heap s.toml --scale huge --device cpu", ("scale", "huge"), {"s.toml": SMALL_STUDY}
-    ),
-    "no such device": Hostile(
-        "heap s.toml --device tpu", ("--device", "tpu", "one of"), {"s.toml": SMALL_STUDY}
-    ),
-    "a setting without value": Hostile(
-        "heap s.toml --device cpu --set E", ("--set", "NAME=VALUE", "E"), {"s.toml": SMALL_STUDY}
-    ),
-    "a setting of no factor": Hostile(
-        "heap s.toml --device cpu --set Q=1", ("--set: Q", "factor", "1"), {"s.toml": SMALL_STUDY}
-    ),
-    "a used folder": Hostile(
-        "heap s.toml --device cpu --out .", (".", "folder is not empty", "--resume"), {"s.toml": SMALL_STUDY}
-    ),
+    "unknown scale": small("heap s.toml --scale huge --device cpu", "scale", "huge"),
+    "no such device": small("heap s.toml --device tpu", "--device", "tpu", "one of"),
+    "a setting without value": small("heap s.toml --device cpu --set E", "--set", "NAME=VALUE", "E"),
+    "a setting of no factor": small("heap s.toml --device cpu --set Q=1", "--set: Q", "factor", "1"),
+    "a used folder": small("heap s.toml --device cpu --out .", ".", "folder is not empty", "--resume"),
     "a bank of nothing": Hostile(
         "discover s.toml m.csv --bank b.npz --device cpu --out o",
         ("b.npz", "must be a bank", "an archive without space, observables, theta"),
@@ -114,7 +128,39 @@ HOSTILE = {
         "calibrate s.toml --device cpu --resume --out in", ("in/study.json", "resume", "cannot be read"),
         {"s.toml": SMALL_STUDY, "in/x": "x"},
     ),
+    "a scale of the paper's study": Hostile("heap --scale bnch", ("did you mean 'bench'",)),
+    "a setting without its unit": Hostile("heap --scale bench --set B=34", ("unit of pressure",)),
+    "a setting that is not physical": Hostile(
+        "heap --scale bench --set E=-1", ("greater than or equal to 0",)
+    ),
+    "no such GPU": Hostile("doctor --device cuda:7", ("--device",)),
+    "no address": small(
+        "calibrate s.toml --scheduler foo --out o",
+        "--scheduler: must be the address of a Dask scheduler, got foo. An example is tcp://HOST:8786.",
+    ),
+    "no engine": small("calibrate s.toml --engine rocky --out o", "engine: must be one of"),
+    "no program": small(
+        "discover s.toml --out o", "must begin with a program on the PATH",
+        add='[engine]\ncommand = "no-such-solver"\n'
+    ),
+    "no folder to watch": Hostile("watch none", ("no such folder",)),
+    "no folder to start in": Hostile("ui none", ("no such folder",)),
+    "a used folder for a campaign": small("calibrate s.toml --device cpu --out .", "folder is not empty"),
+    "a used folder for a search": Hostile(
+        "discover s.toml m.csv --device cpu --out .", ("folder is not empty. Add --resume",),
+        {"s.toml": SMALL_STUDY + CONDITIONS, "m.csv": HEAD + "base,1,height,9,mm\nbase,2,height,9.5,mm\n"},
+    ),
     # Measured heaps
+    "no such condition": measured(
+        HEAD + "slow,1,height,9,mm\n", "m.csv:2", "must be a condition of the study"
+    ),
+    "an impossible height": measured(HEAD + "base,1,height,40,m\n", "m.csv:2", "Check the unit"),
+    "no photographs": Hostile(
+        "discover s.toml m.csv --photographs-only --device cpu --out o --dry-run",
+        ("m.csv: --photographs-only needs an observable that photographs show", "got t75"),
+        {"s.toml": SMALL_STUDY + CONDITIONS, "m.csv": HEAD + "base,1,t75,400,ms\n"},
+    ),
+    "a plan without its data": small("discover s.toml none.csv --device cpu --dry-run", "none.csv"),
     "no measurement": measured(HEAD, "m.csv", "no measured value"),
     "wrong column": measured(HEAD.replace("unit", "units"), "m.csv:1", "known column", "units"),
     "one unit wrong in every row": measured(
@@ -152,10 +198,19 @@ HOSTILE = {
     "binary spheres": clump(bytes(range(256)), "g.txt", "UTF-8", "binary"),
     "no unit of length": clump("0 0 0 1\n", "--unit", "unit of length", "kg", options="--unit kg"),
     # Pictures and heaps
+    "no crop": picture("--crop 1,2,3", "--crop"),
+    "a crop reversed": picture("--crop 10,10,5,20", "left < right"),
+    "no plate": picture("--plate a,b,c,d", "--plate"),
+    "no heap of a picture": picture("--heap 0", "must be 1 or more"),
+    "a view from above": picture("--elevation 70", "elevation"),
+    "no grouping": picture("--by name", "--by"),
+    "a file for the overlays": picture("--overlay p.jpg", "--overlay"),
+    "a heap without radii": Hostile(f"angle {HEAPS}/liggghts_boundingBox_20000.vtk", ("an array radius",)),
+    "no such solid": Hostile("clump cube:2 --spheres 3", ("cube",)),
     "no picture": Hostile("angle p.jpg", ("p.jpg: no such file",)),
     "text as a picture": Hostile("angle p.jpg", ("p.jpg", "not a picture", "6 bytes"),
                                  {"p.jpg": "hello\n"}),
-    "unknown fit": Hostile("angle p.jpg --fit wide", ("fit", "flank, middle", "wide"), {"p.jpg": "x"}),
+    "unknown fit": picture("--fit wide", "fit", "flank, middle", "wide"),
     "one sphere as a heap": Hostile(
         "angle h.csv", ("h.csv", "at least", "1"), {"h.csv": "x,y,z,r\n0,0,1,1\n"}
     ),
@@ -166,19 +221,27 @@ HOSTILE = {
     ),
     "a plate in kilograms": Hostile("angle h.csv --plate-height 3kg", ("--plate-height", "length", "3kg")),
     # Frames
-    "a film of no frames": Hostile(
-        "heap s.toml --device cpu --movie gif --out o", ("--movie", "--frames N", "gif"),
-        {"s.toml": SMALL_STUDY},
+    "one frame": small("heap s.toml --device cpu --frames 1 --out o", "greater than or equal to 2"),
+    "frames of another engine": small(
+        "heap s.toml --device cpu --frames 4 --out o", "--frames: must run on dem-warp's own engine",
+        add=f"[engine]\ncommand = '{sys.executable}'\n",
     ),
-    "an unknown film": Hostile(
-        "heap s.toml --device cpu --frames 4 --movie avi --out o", ("--movie", "gif, mp4", "avi"),
-        {"s.toml": SMALL_STUDY},
+    "a film of no frames": small(
+        "heap s.toml --device cpu --movie gif --out o", "--movie", "--frames N", "gif"
+    ),
+    "an unknown film": small(
+        "heap s.toml --device cpu --frames 4 --movie avi --out o", "--movie", "gif, mp4", "avi"
     ),
     # Other codes
-    "no such code": Hostile(
-        "export s.toml --to magic --out o", ("--to", "magic", "liggghts"), {"s.toml": SMALL_STUDY}
-    ),
+    "no such code": small("export s.toml --to magic --out o", "--to", "magic", "liggghts"),
     "a bridge without a card": Hostile("bridge none.toml --engine lammps --out o", ("none.toml",)),
+    "a card without its test": Hostile(
+        "bridge c.toml --engine lammps", ("lacks the test that it was fitted to",), {"c.toml": "format = 1\n"}
+    ),
+    "no card": Hostile(
+        "bridge c.toml --engine lammps", ("is not a material card",),
+        {"c.toml": "[fitted.test.hopper]\noutlet = 1\n"}
+    ),
     # Names
     "a name of a device": Hostile("new nul", ("NAME", "device of Windows", "nul")),
     "a study that is there": Hostile(

@@ -60,56 +60,6 @@ def test_a_new_study_has_the_relative_law_and_shipped_ones_name_theirs(tmp_path:
     assert named == {"buckwheat": "edem", "trial": "edem"}
 
 
-@pytest.mark.parametrize(
-    ("text", "place", "rule"),
-    [
-        ('[solver]\nlaws = "ligghts"\n', "solver.laws", "must be a set of laws, did you mean 'liggghts'?"),
-        (
-            "[solver]\nlaws = 3\n",
-            "solver.laws",
-            'must name a set of laws, e.g. laws = "liggghts", or be a table',
-        ),
-        ('[solver.laws]\nrolling = "spd2"\n', "solver.laws.rolling", "must be 'own_spin', "),
-        (
-            "[solver.laws]\nrolling_damping = -1.0\n",
-            "solver.laws.rolling_damping",
-            "greater than or equal to 0",
-        ),
-        ('[solver.laws]\nnormal_damping = "viscoelastic"\n', "solver.laws", "damping_rate: must be given"),
-        (
-            '[solver]\nlaws = "relative"\n[mechanism.elastic_plastic_rolling]\nrolling_stiffness = 2.25\n',
-            "solver.laws",
-            "must be 'own_spin' with the mechanism elastic_plastic_rolling, got 'elastic_plastic'",
-        ),
-    ],
-)
-def test_wrong_laws_are_refused_with_rule_value_and_place(
-    write_study: WriteStudy, text: str, place: str, rule: str
-) -> None:
-    path = write_study(add=text)
-    with pytest.raises(StudyError) as caught:
-        load_study(path)
-    assert rule in caught.value.problem
-    assert caught.value.place.startswith(f"{path}:")
-    assert caught.value.place.endswith(place)
-
-
-def test_no_factor_varies_a_law(write_study: WriteStudy) -> None:
-    factor = '[[factor]]\nname = "c"\nlabel = "c"\nlow = 1.0\nhigh = 2.0\n'
-    path = write_study(add=f'{factor}parameter = "solver.laws.rolling_stiffness"\n')
-    with pytest.raises(StudyError, match="must lead to a quantity of the study"):
-        load_study(path)
-
-
-def test_a_restitution_that_the_laws_take_no_part_of_is_no_factor(write_study: WriteStudy) -> None:
-    laws = '[solver.laws]\nbase = "lammps"\nnormal_damping = "mass_velocity"\ndamping_rate = "200 1/s"\n'
-    factor = '[[factor]]\nname = "C"\nlabel = "e"\nlow = 0.2\nhigh = 0.4\n'
-    place = 'parameter = "contact.grain-grain.restitution"\n'
-    path = write_study(("restitution = 0.2\n", ""), add=factor + place + laws)
-    with pytest.raises(StudyError, match="the damping 'mass_velocity' ignores"):
-        load_study(path)
-
-
 def test_cases_of_other_laws_are_stored_apart_and_banks_refused(write_study: WriteStudy) -> None:
     studies = [load_study(write_study(add=f'[solver]\nlaws = "{name}"\n')) for name in PRESETS]
     assert len({case_key(study.case({}, 1)) for study in studies}) == len(PRESETS)

@@ -99,29 +99,6 @@ def test_several_shapes_are_mixed_in_the_order_of_the_file(two_shapes: WriteStud
     assert given.case({}, seed=1).grains == grains
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "key", "rule"),
-    [
-        ("fraction = 0.25", "fraction = 1.25", "grain.shapes.split.fraction", "less than or equal to 1"),
-        ("fraction = 0.25", "fractoin = 0.25", "grain.shapes.split.fractoin", "did you mean 'fraction'?"),
-        ('clump = "split.txt"', 'clump = "none.txt"', "grain.shapes.split.clump", "no such clump file"),
-        ('clump = "split.txt"', 'clump = "split.txt"\nsphere = "1 mm"', "grain.shapes.split", "not both"),
-        ("fraction = 0.25", "", "grain", "every shape but one needs its fraction"),
-        ('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.7', "grain", "add up to 1 .*, got 0.95"),
-    ],
-)
-def test_a_breach_in_one_of_several_shapes_is_placed_there(
-    two_shapes: WriteStudy, old: str, new: str, key: str, rule: str
-) -> None:
-    path = two_shapes((old, new))
-    with pytest.raises(StudyError, match=rule) as caught:
-        load_study(path)
-    place, _, found = caught.value.place.rpartition(": ")
-    assert found == key
-    line = path.read_text(encoding="utf-8").splitlines()[int(place.rpartition(":")[2]) - 1]
-    assert line.startswith(key.rpartition(".")[2] + " ") or line == f"[{key}]"
-
-
 def test_one_shape_and_several_exclude_each_other(two_shapes: WriteStudy) -> None:
     with pytest.raises(StudyError, match=r"one shape .* or several .*, not both"):
         load_study(two_shapes(add='[scale.other]\ngrain.sphere = "1 mm"\n'), "other")
@@ -232,50 +209,6 @@ margin = "1.5 deg"
     assert study.campaign.verification.margin == 1.5
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "key", "rule"),
-    [
-        ('sphere = "2 mm"', "sphere = 2", "grain.sphere", "unit of length"),
-        ('sphere = "2 mm"', 'sphere = "-2 mm"', "grain.sphere", "greater than 0"),
-        ('sphere = "2 mm"', 'sphere = "wide"', "grain.sphere", "must be a number"),
-        ('sphere = "2 mm"', 'clump = "none.txt"', "grain.clump", "no such clump file"),
-        ('sphere = "2 mm"', "", "grain", "needs a clump"),
-        ('sphere = "2 mm"', 'spere = "2 mm"', "grain.spere", "did you mean 'sphere'?"),
-        ("poisson_ratio = 0.25", "poisson_ratio = 0.7", "grain.poisson_ratio", "less than or equal to 0.5"),
-        ('sd = "0.5 deg"\n', "", "target", "missing: sd"),
-        ("low = 0.2", "low = 0.9", "factor[1]", "low must be below high"),
-        ("low = 0.2", "low = -0.2", "factor[1]", "must stay within 0"),
-        (
-            'parameter = "contact.grain-grain.static_friction"',
-            'parameter = "contact.static_friction"',
-            "factor[1].parameter",
-            "quantity of the study",
-        ),
-        (
-            "restitution = 0.2\n",
-            "restitution = 0.2\nstatic_friction = 0.5\n",
-            "contact.grain-grain.static_friction",
-            "varied by the factor 'E'",
-        ),
-        ('name = "E"', 'name = "E:F"', "factor[1].name", "pattern"),
-    ],
-)
-def test_a_breach_is_named_with_its_rule_value_and_line(
-    write_study: WriteStudy, old: str, new: str, key: str, rule: str
-) -> None:
-    path = write_study((old, new))
-    with pytest.raises(StudyError) as caught:
-        load_study(path)
-    error = caught.value
-    assert rule in error.problem
-    place, _, found = error.place.rpartition(": ")
-    assert found == key
-    line = path.read_text(encoding="utf-8").splitlines()[int(place.rpartition(":")[2]) - 1]
-    # The line of the key itself, or of the table that should have it.
-    own_line = line.startswith(key.rpartition(".")[2] + " ")
-    assert own_line or line in ("[grain]", "[target]", "[[factor]]")
-
-
 def test_every_breach_is_listed_with_its_scale(write_study: WriteStudy) -> None:
     path = write_study(('density = "700 kg/m^3"', "density = 700"), add="numerics.precision = 'half'\n")
     with pytest.raises(StudyError) as caught:
@@ -285,48 +218,6 @@ def test_every_breach_is_listed_with_its_scale(write_study: WriteStudy) -> None:
         f"{path}:6: grain.density",
         f"{path}:{last_line}: scale.stiff.numerics.precision",
     ]
-
-
-@pytest.mark.parametrize("key", ["name", "parameter"])
-def test_no_two_factors_share_a_name_or_a_parameter(write_study: WriteStudy, key: str) -> None:
-    other = {"name": "F", "parameter": "contact.grain-wall.static_friction"}
-    other[key] = {"name": "E", "parameter": "contact.grain-grain.static_friction"}[key]
-    extra = f'[[factor]]\nlabel = "x"\nlow = 0.1\nhigh = 0.2\nname = "{other["name"]}"\n'
-    extra += f'parameter = "{other["parameter"]}"\n'
-    with pytest.raises(StudyError, match=f"may have the same {key}"):
-        load_study(write_study(add=extra))
-
-
-@pytest.mark.parametrize(
-    ("extra", "rule"),
-    [
-        ("[campaign.climb]\nstart = { Q = 0.3 }\nstep = { Q = 0.1 }\n", "must name a factor"),
-        ("[campaign.screning]\nruns = 12\n", "did you mean 'screening'?"),
-        ("[campaign.screening]\nruns = 13\n", "multiple of 4"),
-        ("[surplus]\n", "unknown key"),
-    ],
-)
-def test_a_wrong_decision_is_refused(write_study: WriteStudy, extra: str, rule: str) -> None:
-    with pytest.raises(StudyError, match=rule):
-        load_study(write_study(add=extra))
-
-
-def test_a_file_that_is_no_study_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match="no such file"):
-        load_study(tmp_path / "absent.toml")
-    broken = tmp_path / "broken.toml"
-    broken.write_text('name = "x"\nheight = 110 mm\n', encoding="utf-8")
-    with pytest.raises(StudyError, match="valid TOML") as caught:
-        load_study(broken)
-    assert (caught.value.place, caught.value.value) == (f"{broken}:2", "height = 110 mm")
-    broken.write_bytes(b"\xff\xfe")
-    with pytest.raises(StudyError, match="UTF-8"):
-        load_study(broken)
-
-
-def test_an_unknown_scale_is_refused(write_study: WriteStudy) -> None:
-    with pytest.raises(StudyError, match="did you mean 'stiff'"):
-        load_study(write_study(), "stif")
 
 
 def test_a_case_outside_what_is_physical_is_refused(write_study: WriteStudy) -> None:

@@ -6,14 +6,11 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
 from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
 from dem_warp.laws.jkr import JKR
 from dem_warp.laws.rate_weakening import RateWeakening
 from dem_warp.laws.wall_adhesion import WallAdhesion
-from experiments.io.errors import StudyError
 from experiments.studyfile import load_study
 
 WriteStudy = Callable[..., Path]
@@ -60,31 +57,6 @@ wall_adhesion_energy_density = 50.0
         surface_tension=0.072, bridge_volume=2e-8, contact_angle=math.radians(30.0)
     )
     assert weakening == RateWeakening(weakening=0.3, weakening_speed=0.1)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "rule"),
-    [
-        ("[mechanism.jkrr]\nx = 1", r"small.toml:\d+: mechanism.jkrr: unknown key, did you mean 'jkr'"),
-        ("[mechanism.jkr]\nwork_of_adhesion = -1.0", r"mechanism.jkr.work_of_adhesion: must be greater than"),
-        ('[mechanism.jkr]\nbetween = "grain"', r"mechanism.jkr.between: must be 'all', 'grains' or 'walls'"),
-        (
-            "[mechanism.kinetic_friction]\nfriction_drop = 1.5",
-            r"friction_drop: must be less than 1, got 1.5",
-        ),
-        (
-            '[mechanism.jkr]\nwork_of_adhesion = "0.1 J"',
-            r"small.toml:\d+: mechanism.jkr.work_of_adhesion: needs a unit of surface energy \(J/m\^2",
-        ),
-        (
-            "[mechanism.jkr]\nwork_of_adhesion = 0.1\n[mechanism.hysteretic_spring]\nplasticity = 0.3",
-            r"mechanism.jkr and mechanism.hysteretic_spring must not act in one contact",
-        ),
-    ],
-)
-def test_a_wrong_mechanism_is_named_with_its_place(write_study: WriteStudy, wrong: str, rule: str) -> None:
-    with pytest.raises(StudyError, match=rule):
-        load_study(write_study(add=f"\n{wrong}\n"))
 
 
 def test_mechanisms_that_exclude_each_other_may_act_in_different_contacts(write_study: WriteStudy) -> None:

@@ -119,36 +119,6 @@ def test_a_table_is_simulated_each_row_in_its_scene(
     assert found["reason"].eq("").all()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "key", "rule"),
-    [
-        ('observable = "flow_rate"', 'observable = "flow"', "response[2].observable", "the scene measures"),
-        ('scene = "bin"', 'scene = "bim"', "response[2].scene", "did you mean 'bin'?"),
-        ('mean = "12 g/s"', 'mean = "12 g"', "response[2].mean", "unit of mass flow"),
-        ('mean = "12 g/s"\n', "", "response[2]", "missing: mean"),
-        ("sd = 0.01", "sd = 0.0", "response[1].sd", "must be positive"),
-        ('name = "outflow"', 'name = "solid_fraction"', "response[2]", "name that no other response has"),
-        ('"solid_fraction"', '"angle"\nname = "a"', "response[1].observable", "matches this observable"),
-        ('outlet = "20 mm"', 'outlet = "50 mm"', "response-scene.bin.hopper", "below the diameter"),
-    ],
-)  # fmt: skip
-def test_a_breach_is_named_with_its_rule_and_place(
-    write_study: WriteStudy, old: str, new: str, key: str, rule: str
-) -> None:
-    assert RESPONSES.count(old) == 1
-    with pytest.raises(StudyError) as caught:
-        load_study(write_study(add=RESPONSES.replace(old, new)))
-    assert rule in caught.value.problem
-    assert caught.value.place.rpartition(": ")[2] == key
-
-
-def test_a_further_scene_has_a_name_of_its_own(write_study: WriteStudy) -> None:
-    scene = '[response-scene.target.hopper]\ndiameter = "40 mm"\nfill_depth = "30 mm"\noutlet = "20 mm"\n'
-    with pytest.raises(StudyError, match="the name of the study's own scene") as caught:
-        load_study(write_study(add=scene))
-    assert caught.value.place.endswith("response-scene.target")
-
-
 @pytest.mark.parametrize("scale", [None, "bench"])
 def test_the_study_from_a_curve_to_a_point_hides_the_same_truth_at_every_scale(scale: str | None) -> None:
     study = load_study(BUCKWHEAT.with_name("curve_to_point.toml"), scale)

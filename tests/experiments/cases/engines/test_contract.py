@@ -43,9 +43,6 @@ def seeds_run(folder: Path) -> list[int]:
     return list(map(int, (folder / "runs.txt").read_text().split()))
 
 
-# ---- what a program finds ----------------------------------------------------------------------------------
-
-
 def test_a_case_is_written_in_si_with_its_clump_and_its_walls(write_study: Write, tmp_path: Path) -> None:
     clump = tmp_path / "pair.txt"
     clump.write_text("0 0 0 2\n3 0 0 1\n", encoding="utf-8")
@@ -77,9 +74,6 @@ def test_triangles_of_a_tube_have_its_area(small_study: Study) -> None:
         a, b, c = np.moveaxis(triangles_of(wall, 0.1), 1, 0)
         # The sides of a polygon of 180 are 5e-5 shorter than the circle.
         assert 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() == pytest.approx(area, rel=1e-4)
-
-
-# ---- what it answers ---------------------------------------------------------------------------------------
 
 
 def test_a_heap_comes_back_as_the_spheres_that_were_written(tmp_path: Path) -> None:
@@ -132,9 +126,6 @@ def test_several_cases_run_at_once_and_come_back_in_order(small_study: Study, tm
     assert angles == pytest.approx([21.0 + noise, 27.0 + noise, 33.0 + noise], abs=1.0)
     assert results[0].provenance["program"] == "cones 1.0"
     assert results[0].provenance["laws"] == small_study.case({}, 1).laws.to_dict()
-
-
-# ---- every way to fail -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -195,9 +186,6 @@ def test_an_interrupt_ends_the_programs_and_loses_no_finished_case(
     run = engine("sleep-odd", workers=1, time_limit=1.0)(cases, checkpoint=folder)
     assert [result.status for result in run] == ["finished", NO_ANSWER]
     assert seeds_run(tmp_path).count(2) == 1
-
-
-# ---- bad input ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -120,9 +120,6 @@ def test_the_nearest_and_the_same_are_stored_apart(small_study: Study, tmp_path:
     assert len(keys) == 3
 
 
-# ---- the codes themselves ----------------------------------------------------------------------------------
-
-
 REAL = [
     pytest.param(name, marks=pytest.mark.program(program))
     for name, program in {"liggghts": "liggghts", "lammps": "lmp", "yade": "yade"}.items()

@@ -71,23 +71,6 @@ def test_a_search_asks_a_program_and_keeps_what_it_answers(write_study: Write, t
     assert runs(tmp_path / "out") == {"2": 1, "4": 1, "1": 2}
 
 
-@pytest.mark.parametrize(
-    ("command", "words", "text", "said"),
-    [
-        ("calibrate", ["--engine", "rocky"], "", "engine: must be one of"),
-        ("discover", [], '\n[engine]\ncommand = "no-such-solver"\n', "must begin with a program on the PATH"),
-    ],
-)
-def test_an_engine_that_is_not_there_ends_with_code_2_and_leaves_nothing(
-    write_study: Write, tmp_path: Path, command: str, words: list[str], text: str, said: str
-) -> None:
-    out = tmp_path / "out"
-    study = write_study(add=text)
-    result = CliRunner().invoke(app, [command, str(study), "--out", str(out), "--device", "cpu", *words])
-    assert (result.exit_code, out.exists()) == (2, False)
-    assert said in " ".join(result.stderr.split())
-
-
 def test_a_heap_that_cannot_be_drawn_has_a_reason(write_study: Write, tmp_path: Path) -> None:
     study, out = write_study(add=section("high")), tmp_path / "out"
     result = CliRunner().invoke(app, ["heap", str(study), "--out", str(out), "--device", "cpu"])

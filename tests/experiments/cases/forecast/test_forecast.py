@@ -48,9 +48,6 @@ def test_no_scene_and_no_law_is_named_by_the_forecast() -> None:
     assert [name for name in names if re.search(rf"\b{re.escape(name)}\b", text)] == []
 
 
-# ---- work --------------------------------------------------------------------------------------------------
-
-
 def test_steps_are_predicted_within_a_half(small_study: Study) -> None:
     case = small_study.case({"E": 0.4}, 1)
     [result] = simulate([case], "cpu", 1)
@@ -69,9 +66,6 @@ def test_a_case_takes_its_rain_and_the_phases_that_its_test_expects(small_study:
     assert work_of(fixed).steps * case.time_step == pytest.approx(2.5)
 
 
-# ---- shares ------------------------------------------------------------------------------------------------
-
-
 def test_cores_share_the_work_and_none_ends_before_its_longest_case() -> None:
     assert Load.of([WORK] * 8, workers_of()).sphere_steps == pytest.approx(4.0e8)
     long = replace(WORK, steps=9.0e6)
@@ -83,9 +77,6 @@ def test_the_worlds_of_a_launch_step_together_until_the_last_one_ends() -> None:
     assert (load.spheres, load.sphere_steps) == (3100.0, pytest.approx(3100 * 2.0e6))
     two = Load.of([WORK] * 30, workers_of(2, on_gpu=True))
     assert (two.spheres, two.sphere_steps) == (1500.0, pytest.approx(1500 * 1.0e6))
-
-
-# ---- speeds ------------------------------------------------------------------------------------------------
 
 
 def note(works: list[Work], workers: Any, seconds: float, part: float = 1.0) -> None:

@@ -46,9 +46,6 @@ class Stub:
             on_result(index, self.cone())
 
 
-# ---- cost --------------------------------------------------------------------------------------------------
-
-
 def test_a_case_costs_what_its_steps_and_spheres_do(write_study: Write) -> None:
     study = load_study(write_study())
     stiff = load_study(study.file, "stiff")
@@ -58,9 +55,6 @@ def test_a_case_costs_what_its_steps_and_spheres_do(write_study: Write) -> None:
     # A time step follows from the square root of the modulus, which is 400 times as high.
     assert costs[1] / costs[0] == pytest.approx(20.0, rel=0.01)
     assert costs[2] > 2.0 * costs[0]
-
-
-# ---- batches -----------------------------------------------------------------------------------------------
 
 
 def test_on_cpus_every_case_is_a_batch_and_the_costly_ones_come_first(cases: list[Case]) -> None:
@@ -105,9 +99,6 @@ def test_what_needs_other_kernels_is_another_batch(cases: list[Case], small_stud
     double = [replace(case, numerics=replace(case.numerics, precision="double")) for case in cases[:3]]
     planned = plan_batches([*cases, *double], np.ones(11), 1, memory=1e12)
     assert sorted(map(sorted, planned)) == [[*range(8)], [8, 9, 10]]
-
-
-# ---- batches that fail -------------------------------------------------------------------------------------
 
 
 def test_a_batch_that_the_memory_does_not_hold_is_halved_and_tried_again(
@@ -163,9 +154,6 @@ def test_an_error_of_the_caller_is_no_cases(
     with pytest.raises(type(error)):
         OwnWorkers("cpu").simulate(cases, on_result=keep)
     assert stub.sizes == [8]
-
-
-# ---- progress ----------------------------------------------------------------------------------------------
 
 
 def test_progress_is_weighed_by_cost_and_reported_from_the_start(

@@ -138,9 +138,6 @@ def test_the_workers_of_a_scheduler_are_used_by_its_address_until_it_is_gone(
     assert_same_bits(results, OwnWorkers("cpu", 1).simulate(made(small_study, 1)))
 
 
-# ---- what is asked for -------------------------------------------------------------------------------------
-
-
 def test_without_dask_the_message_says_what_to_install(
     write_study: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -258,9 +255,6 @@ def test_jobs_ask_for_what_the_profile_says(tmp_path: Path) -> None:
     assert (options["cores"], options["processes"], options["job_cpu"]) == (4, 4, 8)
     assert (options["walltime"], options["queue"]) == ("01:30:00", "gpu")
     assert options["memory"].startswith("22.3")  # 24 GB in GiB
-
-
-# ---- GPUs --------------------------------------------------------------------------------------------------
 
 
 def test_every_worker_finds_a_gpu_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -89,9 +89,6 @@ def test_an_error_of_the_sending_reaches_who_gives_or_ends_next() -> None:
         puts(SendQueue(put), KeyError("the error of the block comes first"))
 
 
-# ---- a batch on a worker -----------------------------------------------------------------------------------
-
-
 class Cluster:
     """A scheduler that takes no result before the simulation is over, and a worker of it."""
 

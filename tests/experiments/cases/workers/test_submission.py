@@ -168,9 +168,6 @@ def test_the_doctor_says_whether_jobs_can_be_submitted(
     assert _submission(Resources(cluster=ClusterSection(workers=2, gpu=False))) == []
 
 
-# ---- addresses ---------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "text",
     ["foo bar", "", "host", "tcp://host", "ftp://host:80", "host:0", "host:65536"],
@@ -183,11 +180,3 @@ def test_what_is_no_address_is_refused_before_dask_sees_it(text: str) -> None:
 @pytest.mark.parametrize("text", ["host:8786", "tls://node-1.site:80", "tcp://[fe80::1%eth0]:8786"])
 def test_addresses_are_taken(text: str) -> None:
     assert Resources(scheduler=text).scheduler == text
-
-
-def test_no_address_ends_with_2(write_study: Callable[..., Path], tmp_path: Path) -> None:
-    code, _, err = dem_warp("calibrate", write_study(), "--scheduler", "foo bar", "--out", tmp_path / "out")
-    assert code == 2
-    said = "--scheduler: must be the address of a Dask scheduler, got foo bar. An example is tcp://HOST:8786."
-    assert said in " ".join(err.split())
-    assert not (tmp_path / "out").exists()

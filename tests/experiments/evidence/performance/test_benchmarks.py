@@ -42,9 +42,6 @@ def test_an_unknown_scale_is_refused() -> None:
         reference_case("huge")
 
 
-# ---- moments -----------------------------------------------------------------------------------------------
-
-
 def test_moments_are_what_their_names_say(small_columns: Columns) -> None:
     tube = small_columns.cases[0].scene
     filling, settled, lifting = (small_columns.moments(phase, 1)[0] for phase in scene.MOMENTS)
@@ -100,9 +97,6 @@ def test_the_table_has_every_phase_and_adds_up(small_columns: Columns) -> None:
     assert "small" in text
 
 
-# ---- counts ------------------------------------------------------------------------------------------------
-
-
 def test_contacts_are_pairs_of_different_grains_and_walls() -> None:
     centers = np.array([[0.0, 0.0, 0.9], [1.5, 0.0, 0.9], [3.6, 0.0, 1.1], [9.5, 0.0, 5.0]])
     grain = np.array([0, 0, 1, 2])
@@ -133,9 +127,6 @@ def test_near_is_what_may_touch_within_the_paths_of_both(small_columns: Columns)
     listed = (among.grain_pairs + on_walls.wall_pairs) / grains.count
     # a pair at the very edge may fall to either side in fixed point
     assert step_traffic(solver).list_length == pytest.approx(listed, abs=2 / grains.count)
-
-
-# ---- beds, tables, record ----------------------------------------------------------------------------------
 
 
 def test_counts_are_read_from_a_list() -> None:

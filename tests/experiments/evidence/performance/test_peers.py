@@ -149,9 +149,6 @@ def test_a_peer_gets_the_column_and_its_answer_is_read(
         assert done.timings[skin].free_spheres == 9 * column.setup.grains.count
 
 
-# ---- input of each code ------------------------------------------------------------------------------------
-
-
 def rebound(damping: Callable[[float], float]) -> float:
     """Restitution of an impact at unit speed, mass and stiffness, damped by a function of the overlap."""
     impact = solve_ivp(
@@ -243,9 +240,6 @@ def test_yade_s_tube_touches_the_cylinder_from_outside(
     perimeter = yade_peer.SIDES * tube.diameter * np.tan(np.pi / yade_peer.SIDES)
     assert areas.sum() == pytest.approx(perimeter * corners[..., 2].max(), rel=1e-12)
     assert corners[..., 2].max() > tube.height
-
-
-# ---- what cannot run ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", PeerName)

@@ -76,9 +76,6 @@ def test_rolling_friction_is_friction_to_other_codes_with_the_lever_that_the_stu
     assert friction["relative"] == [0.1, 0.1]
 
 
-# ---- the film ----------------------------------------------------------------------------------------------
-
-
 def rows_of(positions: np.ndarray, sizes: np.ndarray, seed: int, velocity: np.ndarray) -> np.ndarray:
     """Rows of a dump of turned grains that move alike, in a strange order."""
     rng = np.random.default_rng(seed)
@@ -168,9 +165,6 @@ def test_times_and_drag_of_a_drawn_film_are_those_it_was_drawn_with() -> None:
     assert len(last.numbers) == 60
 
 
-# ---- effects -----------------------------------------------------------------------------------------------
-
-
 def test_the_energy_density_parts_spheres_as_hard_as_jkr() -> None:
     work, radius, modulus = 0.02, 1.35e-3, 1.2e5
     density = energy_density(work, radius, modulus)
@@ -244,9 +238,6 @@ def test_a_conical_tube_is_right_at_half_its_height() -> None:
     assert math.degrees(math.atan(slope)) == pytest.approx(3.0, rel=1e-6)
 
 
-# ---- the generator -----------------------------------------------------------------------------------------
-
-
 def test_a_setting_is_the_trials_own_and_always_the_same() -> None:
     settings = {Setting.drawn("liggghts", seed) for seed in range(30)}
     assert len(settings) == 30
@@ -287,9 +278,6 @@ def test_trials_are_measured_evenly_over_their_classes() -> None:
         even = seen[-1] * (np.arange(len(order)) + 1) / len(order)
         # each class is half a trial off its share at most, and no kind here has more than two
         assert np.abs(seen - even).max() < 2.0
-
-
-# ---- the codes themselves ----------------------------------------------------------------------------------
 
 
 Sizes = tuple[tuple[str, float], ...]

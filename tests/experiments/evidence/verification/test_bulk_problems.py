@@ -28,8 +28,6 @@ from experiments.evidence.verification.problems.janssen import FRICTION, WALL_FR
 from experiments.evidence.verification.problems.stability import corners, ended_in_order, outcome
 from experiments.studyfile import load_study
 
-# ---- Janssen ---------------------------------------------------------------------------------------------
-
 
 def test_k_comes_back_from_the_load_that_janssen_says():
     k, diameter, height, weight = 0.8, 0.03, 0.09, 2.0
@@ -62,9 +60,6 @@ def test_the_wall_of_a_tube_that_is_drawn_upwards_carries_what_janssen_says():
     assert loads.share < 0.6
 
 
-# ---- Beverloo --------------------------------------------------------------------------------------------
-
-
 def test_exponent_and_constant_come_back_from_beverloos_law():
     flows = [Flow(outlet, 0.6 * (outlet - 1.4) ** EXPONENT) for outlet in (6.0, 8.0, 10.0)]
     assert exponent(flows, 1.4) == pytest.approx(EXPONENT, rel=1e-9)
@@ -79,9 +74,6 @@ def test_bins_differ_in_size_only():
         assert getattr(large, name) == pytest.approx(1.5 * getattr(small, name))
     # Their cross-sections are 2.25 to 1, and so are the grains a second.
     assert large.rain_rate == pytest.approx(2.25 * small.rain_rate)
-
-
-# ---- heaps -----------------------------------------------------------------------------------------------
 
 
 def test_a_kind_of_heap_passes_only_when_the_whole_interval_is_within_the_margin():
@@ -113,9 +105,6 @@ def test_kinds_of_heaps_change_the_numerics_or_the_tube_alone():
     # The corners of a regular polygon of the same area stand outside the circle, by a third of (pi / n)^2.
     corner = np.linalg.norm(tube.vertices[:, :2], axis=1)
     assert corner == pytest.approx(round_tube.radius * (1.0 + (math.pi / SEGMENTS) ** 2 / 3.0), rel=1e-5)
-
-
-# ---- stability -------------------------------------------------------------------------------------------
 
 
 def test_a_corner_at_the_whole_rayleigh_time_is_flagged_and_stored(tmp_path, monkeypatch):

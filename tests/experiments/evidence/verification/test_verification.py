@@ -34,9 +34,6 @@ from experiments.evidence.verification.problems.setups import CLUMP
 LABELS = ("problem", "case", "quantity", "reference")
 
 
-# ---- the account -----------------------------------------------------------------------------------------
-
-
 def test_a_falling_column_obeys_the_law_at_every_step_and_its_energy_closes():
     setup = column(ClumpShape.read(CLUMP), 8, 0.0075, 0.25)
     law = setup.contacts[0]
@@ -60,9 +57,6 @@ def test_an_account_refuses_what_it_cannot_book():
     other = replace(setup.contacts[0], static_friction=0.1)
     with pytest.raises(ValueError, match="needs one base law for all contacts"):
         EnergyAccount(replace(setup, contacts=(setup.contacts[0], other)))
-
-
-# ---- the references --------------------------------------------------------------------------------------
 
 
 def test_the_differential_equation_bounces_back_with_the_chosen_restitution():
@@ -139,9 +133,6 @@ def test_the_base_law_is_one_of_the_laws_of_one_spring():
     solved = slips - np.array([solve_impact(impact).tangential[0] for impact in impacts]) / (0.3 * slow)
     # Measured 3e-5, as the levers are 1e-5 too short and there are 4,000 steps.
     np.testing.assert_allclose(impulse, solved, atol=1e-4)
-
-
-# ---- rows and page ---------------------------------------------------------------------------------------
 
 
 def test_a_row_shows_the_worst_value_and_one_that_is_not_a_number_fails():

@@ -165,12 +165,6 @@ def test_a_wrong_file_is_refused_with_its_place(tmp_path: Path, text: str, rule:
     assert f"{path}, {place}" in err if place != "heap" else str(path) in err
 
 
-def test_a_vtk_file_without_radii_is_refused() -> None:
-    code, _, err = dem_warp("angle", DATA / "liggghts_boundingBox_20000.vtk")
-    assert code == 2
-    assert "an array radius" in err
-
-
 def test_blank_lines_take_no_longer_than_reading_them(tmp_path: Path) -> None:
     # 0.1 s; a search that began anew at each took most of a minute
     (tmp_path / "heap.txt").write_text("0 0 0 1.5\n" + "\n" * 200_000, encoding="utf-8")
