@@ -19,7 +19,8 @@ from experiments.runs import calibration
 SEEDS = "DEM_WARP_TEST_SEEDS"
 """Variable of the environment that names the file of the simulated seeds."""
 
-RADIUS, BASE = 1e-3, 20e-3
+BASE = 20e-3
+"""Radius of the cones [m]."""
 
 
 def cone_engine(
@@ -36,7 +37,7 @@ def cone_engine(
         with Path(os.environ[SEEDS]).open("a", encoding="utf-8") as file:
             file.write(f"{case.seed}\n")
         angle = 15.0 + 30.0 * case.grain_grain.static_friction + 0.3 * math.sin(12.9898 * case.seed)
-        results.append(cone_of(angle))
+        results.append(cone_of(math.tan(math.radians(angle)), observables={"truth": angle}))
         on_result(index, results[-1])
     return results
 
@@ -54,20 +55,24 @@ def without_pages(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(calibration, "verified_heap", lambda *_: None)
 
 
-def cone_of(angle: float) -> CaseResult:
-    """Build the result of a case that ended in a cone of spheres."""
-    grid = np.arange(-BASE, BASE, RADIUS)
-    x, y = (axis.ravel() for axis in np.meshgrid(grid, grid))
-    z = math.tan(math.radians(angle)) * (BASE - np.hypot(x, y))
-    places = np.column_stack([x, y, z])[z > 0.0]
+def resting(positions: np.ndarray, clump: Sequence, **facts: Any) -> CaseResult:
+    """Build the result of a case that ended with equal grains, of one clump [x, y, z, r], at these places."""
+    count = len(positions)
     return CaseResult(
-        status="finished",
-        reason="",
-        positions=places,
-        orientations=np.tile([0.0, 0.0, 0.0, 1.0], (len(places), 1)),
-        sizes=np.ones(len(places)),
-        shapes=np.zeros(len(places), dtype=int),
-        clumps=np.array([[[0.0, 0.0, 0.0, RADIUS]]]),
-        observables={"grain_count": float(len(places)), "time_to_rest": 0.5, "truth": angle},
-        provenance={"device": "CPU"},
+        **{"status": "finished", "reason": ""} | facts,
+        positions=positions,
+        orientations=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
+        sizes=np.ones(count),
+        shapes=np.zeros(count, dtype=int),
+        clumps=np.array([clump]),
     )
+
+
+def cone_of(slope: float, radius: float = 1e-3, **facts: Any) -> CaseResult:
+    """Build the result of a case that ended in a cone of spheres of 20 mm, with a given slope."""
+    x, y = (axis.ravel() for axis in np.meshgrid(*[np.arange(-BASE, BASE, radius)] * 2))
+    z = slope * (BASE - np.hypot(x, y))
+    places = np.column_stack([x, y, z])[z > 0.0]
+    seen = {"grain_count": float(len(places)), "time_to_rest": 0.5} | facts.pop("observables", {})
+    device = {"device": "CPU"}
+    return resting(places, [[0.0, 0.0, 0.0, radius]], observables=seen, provenance=device, **facts)

@@ -10,7 +10,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
 
 from dem_warp import CaseResult
@@ -125,23 +124,9 @@ def cone() -> Callable[..., CaseResult]:
     def build(
         slope: float = 0.5, status: str = "finished", reason: str = "", radius: float = 0.5e-3
     ) -> CaseResult:
-        base = 20e-3
-        grid = np.arange(-base, base, radius)
-        x, y = (axis.ravel() for axis in np.meshgrid(grid, grid))
-        top = slope * (base - np.hypot(x, y))
-        x, y, top = (values[top > 0.0] for values in (x, y, top))
-        count = len(x)
-        return CaseResult(
-            status=status,
-            reason=reason,
-            positions=np.column_stack([x, y, top]),
-            orientations=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
-            sizes=np.ones(count),
-            shapes=np.zeros(count, dtype=int),
-            clumps=np.array([[[0.0, 0.0, 0.0, radius]]]),
-            observables={"grain_count": float(count), "time_to_rest": 0.5},
-            phases=[{"name": "fill", "time": 0.1, "steps": 1000}],
-            provenance={"device": "CPU"},
-        )
+        from cone_engine import cone_of
+
+        phases = [{"name": "fill", "time": 0.1, "steps": 1000}]
+        return cone_of(slope, radius, status=status, reason=reason, phases=phases)
 
     return build

@@ -1,21 +1,19 @@
 """The campaign on analytic heaps: a known surface and a noise that each seed determines."""
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from analytic_heaps import NOISE, AnalyticHeaps, Angle, StandInStudy, settings
 
 from doe import Factor, Sample
 from experiments.calibrate import Campaign, ClimbEnd, Outcome, calibrate
 from experiments.calibrate.results import STAGES
-from experiments.studyfile.campaign import CampaignSettings, Response, Target, Twin
-
-NOISE = 0.3  # standard deviation of one analytic heap [deg]
+from experiments.studyfile.campaign import Response, Target, Twin
 
 FACTORS = (
     Factor("A", 0.16, 0.42),
@@ -24,7 +22,6 @@ FACTORS = (
     Factor("F", 0.18, 0.58),
     Factor("G", 0.03, 0.08),
 )
-Angle = Callable[[Mapping[str, float]], float]
 ANGLE = Response("angle", "angle", "deg")
 
 
@@ -38,43 +35,9 @@ def hidden(**truth: float) -> Target:
     return Target((ANGLE,), Twin(truth))
 
 
-@dataclass(frozen=True)
-class AnalyticStudy:
-    file: Path = Path("study.toml")
-    target: Target = field(default_factory=lambda: measured(26.0, 0.4))
-    campaign: CampaignSettings = field(default_factory=CampaignSettings)
-    factors: tuple[Factor, ...] = FACTORS
-    labels: Mapping[str, str] = field(
-        default_factory=lambda: {factor.name: f"parameter {factor.name}" for factor in FACTORS}
-    )
-    limits: Mapping[str, tuple[float, float]] = field(
-        default_factory=lambda: {name: (0.0, float("inf")) for name in "EFG"}
-    )
-
-
-class AnalyticHeaps:
-    """A runner: the angle is a function of the settings, plus noise from the case's seed."""
-
-    def __init__(
-        self, angle: Angle, sd: float = NOISE, fails: Callable[[pd.Series], bool] | None = None
-    ) -> None:
-        self.angle, self.sd, self.fails = angle, sd, fails or (lambda row: False)
-        self.tables: list[pd.DataFrame] = []
-
-    def __call__(self, table: pd.DataFrame) -> pd.DataFrame:
-        self.tables.append(table)
-        rows = [row for _, row in table.iterrows()]
-        noise = [self.sd * np.random.default_rng(int(row["seed"])).standard_normal() for row in rows]
-        angle = [
-            np.nan if self.fails(row) else self.angle(row) + n for row, n in zip(rows, noise, strict=True)
-        ]
-        failed = np.isnan(angle)
-        return table.assign(
-            status=np.where(failed, "diverged", "finished"),
-            reason=np.where(failed, "the energy grew without bound", ""),
-            angle=angle,
-            angle_se=0.1,
-        )
+def analytic_study(target: Target | None = None, **decisions: Mapping) -> StandInStudy:
+    """Make a study of five factors whose target is 26 degrees."""
+    return StandInStudy(target or measured(26.0, 0.4), FACTORS, settings(**decisions))
 
 
 def coded(row: Mapping[str, float], name: str) -> float:
@@ -92,15 +55,11 @@ def ends_after_screening(angle: Angle) -> AnalyticHeaps:
     return AnalyticHeaps(angle, fails=lambda row: row["stage"] == "climb")
 
 
-def settings(**sections: Mapping) -> CampaignSettings:
-    return CampaignSettings.model_validate(sections)
-
-
 @cache
 def chain() -> tuple[Campaign, AnalyticHeaps]:
     """Calibrate the default study once."""
     heaps = AnalyticHeaps(two_frictions)
-    return calibrate(AnalyticStudy(), heaps), heaps
+    return calibrate(analytic_study(), heaps), heaps
 
 
 def test_the_whole_chain_finds_a_known_contour() -> None:
@@ -135,15 +94,15 @@ def test_contour_and_region_belong_to_the_reduced_surface() -> None:
 
 def test_same_seeds_give_the_same_campaign_and_other_seeds_another() -> None:
     first = chain()[0].to_dict()
-    assert first == calibrate(AnalyticStudy(), AnalyticHeaps(two_frictions)).to_dict()
-    other_study = AnalyticStudy(campaign=settings(seeds={"campaign": 11}))
+    assert first == calibrate(analytic_study(), AnalyticHeaps(two_frictions)).to_dict()
+    other_study = analytic_study(seeds={"campaign": 11})
     other = calibrate(other_study, ends_after_screening(two_frictions)).to_dict()
     assert first["noise_floor"]["responses"] != other["noise_floor"]["responses"]
 
 
 def test_more_replicates_change_no_other_case() -> None:
     def cases(replicates: int) -> pd.DataFrame:
-        study = AnalyticStudy(campaign=settings(screening={"replicates": replicates}))
+        study = analytic_study(screening={"replicates": replicates})
         table = calibrate(study, ends_after_screening(two_frictions)).screening.cases
         return table[table["replicate"] == 1].reset_index(drop=True)
 
@@ -155,7 +114,7 @@ def test_a_twin_recovers_its_hidden_truth_in_the_compatible_region() -> None:
     inside = []
     for seed in range(10, 22, 2):
         seeds = {"campaign": seed, "target": seed + 1}
-        study = AnalyticStudy(target=hidden(**truth), campaign=settings(seeds=seeds))
+        study = analytic_study(hidden(**truth), seeds=seeds)
         campaign = calibrate(study, AnalyticHeaps(two_frictions))
         assert campaign.target.truth["A"] == pytest.approx(0.29)
         inside.append(campaign.optimum is not None and campaign.optimum.truth.compatible is True)
@@ -168,7 +127,7 @@ def test_a_truth_that_is_not_where_the_angle_says_is_called_incompatible() -> No
         # The target heaps are 1.5 deg higher than the same settings do later: a model error of 5 noise sd.
         return two_frictions(row) + (1.5 if row["stage"] == "target" else 0.0)
 
-    study = AnalyticStudy(target=hidden(E=0.46, F=0.38))
+    study = analytic_study(hidden(E=0.46, F=0.38))
     check = calibrate(study, AnalyticHeaps(shifted)).optimum.truth
     assert check.inside_design
     assert check.compatible is False
@@ -177,8 +136,8 @@ def test_a_truth_that_is_not_where_the_angle_says_is_called_incompatible() -> No
 
 
 def test_a_fixed_point_is_taken_even_where_the_surface_misses_the_target() -> None:
-    fixed = settings(surface={"center": {"E": 0.36, "F": 0.22}}, optimum={"point": {"E": 0.38, "F": 0.25}})
-    study = AnalyticStudy(target=hidden(E=0.5, F=0.45), campaign=fixed)
+    fixed = {"surface": {"center": {"E": 0.36, "F": 0.22}}, "optimum": {"point": {"E": 0.38, "F": 0.25}}}
+    study = analytic_study(hidden(E=0.5, F=0.45), **fixed)
     campaign = calibrate(study, AnalyticHeaps(two_frictions))
     assert campaign.optimum.point == {"E": 0.38, "F": 0.25}
     assert campaign.optimum.contour.empty
@@ -189,8 +148,7 @@ def test_a_fixed_point_is_taken_even_where_the_surface_misses_the_target() -> No
 
 def test_no_significant_factor() -> None:
     # At the default level of 0.10, one of five null factors is kept in 4 of 10 campaigns.
-    strict = settings(selection={"alpha": 0.01})
-    campaign = calibrate(AnalyticStudy(campaign=strict), AnalyticHeaps(lambda row: 24.0))
+    campaign = calibrate(analytic_study(selection={"alpha": 0.01}), AnalyticHeaps(lambda row: 24.0))
     assert campaign.outcome is Outcome.NO_SIGNIFICANT_FACTOR
     assert list(campaign.stages) == ["target", "noise_floor", "screening", "selection"]
     assert campaign.climb is None
@@ -204,13 +162,13 @@ def test_no_significant_factor() -> None:
 def test_of_many_significant_factors_the_strongest_are_kept() -> None:
     weights = dict(zip("ABEFG", (1.0, 1.5, 3.0, 2.5, 2.0), strict=True))
     heaps = ends_after_screening(lambda row: 25.0 + sum(w * coded(row, n) for n, w in weights.items()))
-    selection = calibrate(AnalyticStudy(campaign=settings(selection={"at_most": 2})), heaps).selection
+    selection = calibrate(analytic_study(selection={"at_most": 2}), heaps).selection
     assert selection.kept == ("E", "F")
     assert "Every factor is significant" in selection.decisions[0].outcome
 
 
 def test_a_climb_that_never_reaches_the_target() -> None:
-    study = AnalyticStudy(target=measured(60.0, 0.5))
+    study = analytic_study(measured(60.0, 0.5))
     heaps = AnalyticHeaps(lambda row: 24.0 + 3.0 * coded(row, "E") + 3.0 * coded(row, "F"))
     campaign = calibrate(study, heaps)
     assert campaign.outcome is Outcome.TARGET_NOT_REACHED
@@ -222,7 +180,7 @@ def test_a_climb_that_never_reaches_the_target() -> None:
 
 
 def test_a_target_below_the_first_step_extends_the_climb_downward() -> None:
-    study = AnalyticStudy(target=measured(16.5, 0.5))
+    study = analytic_study(measured(16.5, 0.5))
     heaps = AnalyticHeaps(lambda row: 24.0 + 3.0 * coded(row, "E") + 3.0 * coded(row, "F"))
     campaign = calibrate(study, heaps)
     assert campaign.climb.path.index.min() < 1
@@ -233,7 +191,7 @@ def test_a_target_below_the_first_step_extends_the_climb_downward() -> None:
 
 
 def test_a_climb_that_meets_a_hard_limit_stays_inside_it() -> None:
-    study = AnalyticStudy(target=measured(8.0, 0.5), campaign=settings(climb={"reach": 3.0}))
+    study = analytic_study(measured(8.0, 0.5), climb={"reach": 3.0})
     heaps = AnalyticHeaps(lambda row: 24.0 + 3.0 * coded(row, "E") + 5.0 * coded(row, "F"))
     campaign = calibrate(study, heaps)
     assert campaign.climb.path["F"].min() == 0.0
@@ -243,7 +201,7 @@ def test_a_climb_that_meets_a_hard_limit_stays_inside_it() -> None:
 
 def test_a_climb_whose_start_is_its_bound_says_so() -> None:
     fixed = {"start": {"F": 0.78}, "step": {"F": 0.1}}
-    study = AnalyticStudy(campaign=settings(selection={"keep": ["F"]}, climb=fixed))
+    study = analytic_study(selection={"keep": ["F"]}, climb=fixed)
     campaign = calibrate(study, AnalyticHeaps(two_frictions))
     assert campaign.outcome is Outcome.TARGET_NOT_REACHED
     assert "cannot leave its start (parameter F (F) 0.78)" in campaign.reason
@@ -253,14 +211,14 @@ def test_a_climb_that_turns_is_a_plateau() -> None:
     heaps = AnalyticHeaps(
         lambda row: 24.0 + 4.0 * coded(row, "F") - 4.0 * max(coded(row, "F") - 0.2, 0.0) ** 2 * 5
     )
-    study = AnalyticStudy(campaign=settings(selection={"keep": ["F"]}), target=measured(30.0, 0.4))
+    study = analytic_study(measured(30.0, 0.4), selection={"keep": ["F"]})
     campaign = calibrate(study, heaps)
     assert campaign.outcome is Outcome.PLATEAU
     assert campaign.climb.end is ClimbEnd.TURNED
 
 
 def test_a_climb_without_slope_is_a_plateau() -> None:
-    study = AnalyticStudy(campaign=settings(selection={"keep": ["G"]}))
+    study = analytic_study(selection={"keep": ["G"]})
     campaign = calibrate(study, AnalyticHeaps(lambda row: 20.0))
     assert campaign.outcome is Outcome.PLATEAU
     assert campaign.climb.end is ClimbEnd.FLAT
@@ -268,15 +226,14 @@ def test_a_climb_without_slope_is_a_plateau() -> None:
 
 def test_heaps_that_change_at_the_optimum_are_not_verified() -> None:
     heaps = AnalyticHeaps(lambda row: two_frictions(row) + (2.0 if row["stage"] == "verification" else 0.0))
-    campaign = calibrate(AnalyticStudy(), heaps)
+    campaign = calibrate(analytic_study(), heaps)
     assert campaign.outcome is Outcome.MISSED
     assert campaign.verification.leading.different
     assert not campaign.verification.verified
 
 
 def test_without_equivalence_a_campaign_is_not_calibrated() -> None:
-    narrow = settings(verification={"margin": 0.05})
-    campaign = calibrate(AnalyticStudy(campaign=narrow), AnalyticHeaps(two_frictions))
+    campaign = calibrate(analytic_study(verification={"margin": 0.05}), AnalyticHeaps(two_frictions))
     assert campaign.outcome is Outcome.UNDECIDED
     assert not campaign.verification.leading.different
     assert "equivalence is not shown for angle" in campaign.reason
@@ -286,7 +243,7 @@ def test_without_equivalence_a_campaign_is_not_calibrated() -> None:
 @pytest.mark.parametrize("names", [("F",), ("E", "F", "G")])
 def test_one_and_three_kept_factors(names: tuple[str, ...]) -> None:
     heaps = AnalyticHeaps(lambda row: 25.0 + sum(3.0 * coded(row, name) for name in names))
-    campaign = calibrate(AnalyticStudy(campaign=settings(selection={"alpha": 0.01})), heaps)
+    campaign = calibrate(analytic_study(selection={"alpha": 0.01}), heaps)
     assert set(campaign.selection.kept) == set(names)
     assert campaign.outcome is Outcome.CALIBRATED
     assert campaign.optimum.contour.shape[1] == len(names)
@@ -298,7 +255,7 @@ def test_one_and_three_kept_factors(names: tuple[str, ...]) -> None:
 @pytest.mark.parametrize("stage", ["target", "screening", "verification"])
 def test_a_stage_whose_cases_all_fail_ends_the_campaign(stage: str) -> None:
     heaps = AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == stage)
-    campaign = calibrate(AnalyticStudy(target=hidden(E=0.5, F=0.42)), heaps)
+    campaign = calibrate(analytic_study(hidden(E=0.5, F=0.42)), heaps)
     assert campaign.outcome is Outcome.TOO_MANY_FAILED_RUNS
     assert stage not in campaign.stages
     assert "diverged" in campaign.reason
@@ -316,7 +273,7 @@ def test_a_few_failed_cases_are_stated_and_do_not_stop_the_campaign() -> None:
     heaps = AnalyticHeaps(
         two_frictions, fails=lambda row: (row["stage"], row["run"], row["replicate"]) in lost
     )
-    campaign = calibrate(AnalyticStudy(), heaps)
+    campaign = calibrate(analytic_study(), heaps)
     assert campaign.outcome is Outcome.CALIBRATED
     assert len(campaign.failed_cases) == len(lost)
     assert np.isnan(campaign.screening.leading.measured[2, 0])
@@ -328,10 +285,8 @@ def test_a_few_failed_cases_are_stated_and_do_not_stop_the_campaign() -> None:
 
 
 def test_points_stay_inside_hard_limits_and_leave_stated_ranges_openly() -> None:
-    study = AnalyticStudy(
-        campaign=settings(surface={"center": {"E": 0.46, "F": 0.05}, "half_range": {"E": 0.15, "F": 0.08}}),
-        target=measured(15.0, 0.5),
-    )
+    surface = {"center": {"E": 0.46, "F": 0.05}, "half_range": {"E": 0.15, "F": 0.08}}
+    study = analytic_study(measured(15.0, 0.5), surface=surface)
     campaign = calibrate(study, AnalyticHeaps(two_frictions))
     surface = campaign.surface
     assert surface.design.natural["F"].min() >= 0.0
@@ -351,7 +306,7 @@ def test_points_stay_inside_hard_limits_and_leave_stated_ranges_openly() -> None
 def test_results_are_plain_finite_json_and_tables() -> None:
     stages: list[str] = []
     campaign = calibrate(
-        AnalyticStudy(target=hidden(E=0.5, F=0.42)),
+        analytic_study(hidden(E=0.5, F=0.42)),
         AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == "climb" and row["run"] == 1),
         on_stage=lambda name, result: stages.append(name),
     )
@@ -378,5 +333,5 @@ def test_results_are_plain_finite_json_and_tables() -> None:
 def test_settings_that_do_not_fit_the_factors_stop_before_any_case(section: dict, place: str) -> None:
     heaps = AnalyticHeaps(two_frictions)
     with pytest.raises(ValueError, match=place):
-        calibrate(AnalyticStudy(campaign=settings(**section)), heaps)
+        calibrate(analytic_study(**section), heaps)
     assert heaps.tables == []

@@ -1,13 +1,11 @@
 """The stages replayed on the paper's printed angles take the paper's decisions."""
 
-import math
-from dataclasses import dataclass, field
-
 import numpy as np
 import pandas as pd
 import pytest
+from analytic_heaps import StandInStudy, settings
 
-from doe import Design, Factor, Sample, compare_means, noise_floor
+from doe import Design, Sample, compare_means, noise_floor
 from experiments.calibrate import ClimbEnd
 from experiments.calibrate.climb_stage import climb, require_crossing
 from experiments.calibrate.optimum_stage import find_optimum
@@ -25,31 +23,16 @@ from experiments.calibrate.surface_stage import explore_surface
 from experiments.calibrate.target_stage import settle_target
 from experiments.calibrate.verification_stage import verify
 from experiments.studies.buckwheat.paper import factors, published
-from experiments.studyfile.campaign import CampaignSettings, Response, Target
+from experiments.studyfile.campaign import Response, Target
 
 ANGLE = "repose_angle_deg"
 
-PAPER_DECISIONS = CampaignSettings.model_validate(
-    {
-        "climb": {"start": {"E": 0.30, "F": 0.15}, "step": {"E": 0.06, "F": 0.10}, "replicates": 1},
-        "surface": {"center_rule": "smallest-error", "alpha": 1.414, "drop": ["F^2"]},
-        "verification": {"replicates": 3},
-    }
+PAPER_DECISIONS = settings(
+    climb={"start": {"E": 0.30, "F": 0.15}, "step": {"E": 0.06, "F": 0.10}, "replicates": 1},
+    surface={"center_rule": "smallest-error", "alpha": 1.414, "drop": ["F^2"]},
+    verification={"replicates": 3},
 )
-
-
 MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(30.148, 0.518, 5)),))
-
-
-@dataclass(frozen=True)
-class PaperStudy:
-    campaign: CampaignSettings = PAPER_DECISIONS
-    factors: tuple[Factor, ...] = field(default_factory=lambda: tuple(factors()))
-    labels: dict[str, str] = field(default_factory=lambda: {factor.name: factor.name for factor in factors()})
-    target: Target = MEASURED
-    limits: dict[str, tuple[float, float]] = field(
-        default_factory=lambda: dict.fromkeys("ABCDEFGH", (0.0, math.inf))
-    )
 
 
 def printed_angles(points: pd.DataFrame, angles: pd.Series) -> dict[tuple[float, float], list[float]]:
@@ -84,12 +67,12 @@ def verification_runner(table: pd.DataFrame) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def study() -> PaperStudy:
-    return PaperStudy()
+def study() -> StandInStudy:
+    return StandInStudy(MEASURED, tuple(factors()), PAPER_DECISIONS)
 
 
 @pytest.fixture(scope="module")
-def target(study: PaperStudy) -> TargetResult:
+def target(study: StandInStudy) -> TargetResult:
     return settle_target(study)
 
 
@@ -102,7 +85,7 @@ def noise() -> NoiseFloorResult:
 
 
 @pytest.fixture(scope="module")
-def screening(study: PaperStudy) -> ScreeningResult:
+def screening(study: StandInStudy) -> ScreeningResult:
     table = published("plackett_burman")
     names = [factor.name for factor in study.factors]
     runs = table.drop(columns=ANGLE)
@@ -113,13 +96,13 @@ def screening(study: PaperStudy) -> ScreeningResult:
 
 
 @pytest.fixture(scope="module")
-def selection(study: PaperStudy, screening: ScreeningResult, noise: NoiseFloorResult) -> SelectionResult:
+def selection(study: StandInStudy, screening: ScreeningResult, noise: NoiseFloorResult) -> SelectionResult:
     return select_factors(study.campaign.selection, screening, noise, study.target.leading)
 
 
 @pytest.fixture(scope="module")
 def path(
-    study: PaperStudy,
+    study: StandInStudy,
     screening: ScreeningResult,
     selection: SelectionResult,
     noise: NoiseFloorResult,
@@ -129,7 +112,7 @@ def path(
 
 
 @pytest.fixture(scope="module")
-def surface(study: PaperStudy, path: ClimbResult) -> SurfaceResult:
+def surface(study: StandInStudy, path: ClimbResult) -> SurfaceResult:
     return explore_surface(study, path, composite_runner)
 
 
@@ -147,7 +130,7 @@ def test_effects_above_the_noise_that_were_not_kept_are_named(selection: Selecti
 
 
 def test_the_climb_is_the_printed_one_and_its_fourth_step_is_nearest(
-    path: ClimbResult, study: PaperStudy, target: TargetResult
+    path: ClimbResult, study: StandInStudy, target: TargetResult
 ) -> None:
     steps = published("steepest_climb")
     np.testing.assert_allclose(path.path[["E", "F"]], steps[["E", "F"]], atol=1e-12)
@@ -183,7 +166,7 @@ def test_the_surfaces_are_the_published_ones(surface: SurfaceResult) -> None:
 
 
 def test_the_optimum_is_the_contours_point_nearest_to_the_centre(
-    study: PaperStudy, surface: SurfaceResult, target: TargetResult
+    study: StandInStudy, surface: SurfaceResult, target: TargetResult
 ) -> None:
     optimum = find_optimum(study, surface, target)
     # The recomputed point (.479518, .448979) is that of the printed equation (9); its three decimals move
@@ -198,7 +181,7 @@ def test_the_optimum_is_the_contours_point_nearest_to_the_centre(
 
 
 def test_the_verification_is_the_printed_t_test(
-    study: PaperStudy, surface: SurfaceResult, target: TargetResult
+    study: StandInStudy, surface: SurfaceResult, target: TargetResult
 ) -> None:
     result = verify(study, find_optimum(study, surface, target), target, verification_runner)
     # The paper's own test takes one variance for both; a campaign takes Welch's (test_published has both).

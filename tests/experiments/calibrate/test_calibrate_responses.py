@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from analytic_heaps import StandInStudy, settings
 
 from doe import Factor, Sample
 from experiments.calibrate import Campaign, Outcome, calibrate
-from experiments.studyfile.campaign import CampaignSettings, Response, Target, Twin
+from experiments.studyfile.campaign import Response, Target, Twin
 
 FACTORS = (Factor("A", 0.1, 0.3), Factor("E", 0.3, 0.6), Factor("F", 0.2, 0.6), Factor("G", 0.02, 0.08))
 
@@ -59,22 +60,6 @@ MEASURED = {"target": {"angle": angle, "solid_fraction": solid_fraction}, "bin":
 """Observables of every scene."""
 
 
-@dataclass(frozen=True)
-class TwoScenes:
-    """A study on the angle, the density of the same heaps, and the mass left in a bin."""
-
-    target: Target
-    campaign: CampaignSettings = field(default_factory=CampaignSettings)
-    file: Path = Path("study.toml")
-    factors: tuple[Factor, ...] = FACTORS
-    labels: Mapping[str, str] = field(
-        default_factory=lambda: {factor.name: f"parameter {factor.name}" for factor in FACTORS}
-    )
-    limits: Mapping[str, tuple[float, float]] = field(
-        default_factory=lambda: {name: (0.0, float("inf")) for name in "AEFG"}
-    )
-
-
 class Cases:
     """A runner: every scene measures functions of the settings, plus noise from the case's seed."""
 
@@ -98,8 +83,8 @@ class Cases:
         return {"status": "finished", "reason": "", "simulated_time": 2.0} | found
 
 
-def twin(*responses: Response) -> TwoScenes:
-    return TwoScenes(Target((ANGLE, *responses), Twin(TRUTH)))
+def twin(*responses: Response) -> StandInStudy:
+    return StandInStudy(Target((ANGLE, *responses), Twin(TRUTH)), FACTORS)
 
 
 @cache
@@ -146,10 +131,7 @@ def test_factors_of_other_responses_are_kept_after_those_of_the_first() -> None:
     def density(row: Mapping[str, float]) -> float:
         return 0.55 + 0.05 * coded(row, "G") + 0.04 * coded(row, "A")
 
-    study = TwoScenes(
-        Target((ANGLE, DENSITY), Twin(TRUTH)),
-        CampaignSettings.model_validate({"selection": {"at_most": 3}}),
-    )
+    study = replace(twin(DENSITY), campaign=settings(selection={"at_most": 3}))
     # The campaign may end after the selection.
     cases = Cases(fails=lambda row: row["stage"] == "climb", solid_fraction=density)
     selection = calibrate(study, cases).selection
@@ -186,9 +168,10 @@ def test_a_further_scene_leaves_the_heaps_as_they_were() -> None:
 
 
 def test_measured_responses_are_matched_and_a_wrong_one_is_named() -> None:
-    def study(density: float) -> TwoScenes:
+    def study(density: float) -> StandInStudy:
         aims = {"angle": Sample(angle(TRUTH), 0.3, 5), "density": Sample(density, 0.001, 5)}
-        return TwoScenes(Target(tuple(replace(r, measured=aims[r.name]) for r in (ANGLE, DENSITY))))
+        target = Target(tuple(replace(r, measured=aims[r.name]) for r in (ANGLE, DENSITY)))
+        return StandInStudy(target, FACTORS)
 
     right, wrong = (calibrate(study(value), Cases()) for value in (solid_fraction(TRUTH), 0.62))
     assert right.outcome is Outcome.CALIBRATED

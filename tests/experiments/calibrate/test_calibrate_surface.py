@@ -1,11 +1,12 @@
 """The composite design and the optimum on a plane whose contours are straight lines."""
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 import pytest
+from analytic_heaps import StandInStudy, settings
 
 from doe import Factor, Sample
 from experiments.calibrate import ClimbEnd, Outcome
@@ -13,7 +14,7 @@ from experiments.calibrate.cases import StageEnd
 from experiments.calibrate.optimum_stage import find_optimum
 from experiments.calibrate.results import ClimbResult, SurfaceResult, TargetResult
 from experiments.calibrate.surface_stage import explore_surface, require_slope
-from experiments.studyfile.campaign import CampaignSettings, Response, Target
+from experiments.studyfile.campaign import Response, Target
 
 CENTER = {"E": 1.0, "F": 1.0}
 HALF_RANGE = 0.4
@@ -24,18 +25,13 @@ NOISE = 0.01
 MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(20.0, NOISE, 5)),))
 
 
-@dataclass(frozen=True)
-class PlaneStudy:
-    campaign: CampaignSettings = field(default_factory=CampaignSettings)
-    factors: tuple[Factor, ...] = (Factor("E", 0.0, 2.0), Factor("F", 0.0, 2.0))
-    labels: dict[str, str] = field(default_factory=lambda: {name: f"friction {name}" for name in "EF"})
-    target: Target = MEASURED
-    limits: dict[str, tuple[float, float]] = field(
-        default_factory=lambda: dict.fromkeys("EF", (-math.inf, math.inf))
-    )
+def plane_study(**decisions: Mapping) -> StandInStudy:
+    """Make a study of two frictions without limits."""
+    factors = (Factor("E", 0.0, 2.0), Factor("F", 0.0, 2.0))
+    return StandInStudy(MEASURED, factors, settings(**decisions), least=-math.inf)
 
 
-def explored(slope: float, step: float = 0.1, campaign: CampaignSettings | None = None) -> SurfaceResult:
+def explored(slope: float, step: float = 0.1, **decisions: Mapping) -> SurfaceResult:
     """Explore a plane: 20 deg at the centre, ``slope`` deg for a coded unit of either factor."""
 
     def heaps(table: pd.DataFrame) -> pd.DataFrame:
@@ -48,7 +44,7 @@ def explored(slope: float, step: float = 0.1, campaign: CampaignSettings | None 
     climb = ClimbResult(
         pd.DataFrame(), ("E", "F"), path, step_by_name, ClimbEnd.CROSSED, CENTER, 1.0, 1, decisions=()
     )
-    return explore_surface(PlaneStudy(campaign or CampaignSettings()), climb, heaps)
+    return explore_surface(plane_study(**decisions), climb, heaps)
 
 
 def aim(mean: float, truth: dict[str, float] | None = None) -> TargetResult:
@@ -68,7 +64,7 @@ def test_a_half_range_is_a_climb_step_but_not_too_short(step: float, half_range:
 # points reach sqrt(2), the runs' circle too: s = 2 passes through the corner of the two-level part.
 @pytest.mark.parametrize(("line", "extent"), [(0.0, 1.0), (-1.9, 1.0)])
 def test_the_nearest_point_of_a_line(line: float, extent: float) -> None:
-    optimum = find_optimum(PlaneStudy(), explored(3.0), aim(20.0 + 3.0 * line))
+    optimum = find_optimum(plane_study(), explored(3.0), aim(20.0 + 3.0 * line))
     # Standard error of the fit in coded units: below NOISE / slope; ten of them.
     assert optimum.point == pytest.approx(at_coded(line / 2, line / 2), abs=10 * NOISE / 3.0 * HALF_RANGE)
     assert optimum.extent == extent
@@ -77,7 +73,7 @@ def test_the_nearest_point_of_a_line(line: float, extent: float) -> None:
 def test_a_contour_beyond_the_runs_is_no_optimum_although_the_box_reaches_it() -> None:
     # s = 2.4 is 1.70 from the centre, outside the circle of the runs, inside the box of the axial points.
     with pytest.raises(StageEnd, match="beyond the design's runs") as end:
-        find_optimum(PlaneStudy(), explored(3.0), aim(20.0 + 3.0 * 2.4))
+        find_optimum(plane_study(), explored(3.0), aim(20.0 + 3.0 * 2.4))
     assert end.value.outcome is Outcome.NO_CONTOUR
 
 
@@ -88,7 +84,7 @@ def test_a_target_that_the_surface_misses_within_their_errors_has_its_closest_po
     line: float, sd: float
 ) -> None:
     target = TargetResult({"angle": Sample(20.0 + 3.0 * line, sd, 5)}, None, None, ())
-    optimum = find_optimum(PlaneStudy(), explored(3.0), target)
+    optimum = find_optimum(plane_study(), explored(3.0), target)
     # Cells of the region are .007 apart, 400 over 2 sqrt(2): 3 x 2 x .007 / 2 degrees. Along the circle the
     # plane falls by the square of the angle, 3 degrees a unit of it: as little within .12.
     assert optimum.prediction["mean"] == pytest.approx(26.0, abs=0.021 + 10 * NOISE)
@@ -107,7 +103,7 @@ def test_a_target_that_the_surface_misses_within_their_errors_has_its_closest_po
     ],
 )
 def test_where_a_hidden_truth_lies(truth: tuple[float, float], inside: bool, compatible: bool | None) -> None:
-    check = find_optimum(PlaneStudy(), explored(3.0), aim(20.0, at_coded(*truth))).truth
+    check = find_optimum(plane_study(), explored(3.0), aim(20.0, at_coded(*truth))).truth
     assert (check.inside_design, check.compatible) == (inside, compatible)
     # Distance of a point to the line E + F = 0; the line itself is known to ten standard errors.
     assert check.distance == pytest.approx(abs(sum(truth)) / math.sqrt(2.0), abs=10 * NOISE / 3.0)
@@ -115,10 +111,10 @@ def test_where_a_hidden_truth_lies(truth: tuple[float, float], inside: bool, com
 
 def test_a_truth_is_judged_as_the_cells_of_the_region_are() -> None:
     surface = explored(0.02)
-    region = find_optimum(PlaneStudy(), surface, aim(20.0)).region
+    region = find_optimum(plane_study(), surface, aim(20.0)).region
     cells = np.linspace(0, len(region.mask) - 1, 6).astype(int)
     truths = [{str(n): float(v) for n, v in region.natural.iloc[cell].items()} for cell in cells]
-    judged = [find_optimum(PlaneStudy(), surface, aim(20.0, truth)).truth.compatible for truth in truths]
+    judged = [find_optimum(plane_study(), surface, aim(20.0, truth)).truth.compatible for truth in truths]
     assert judged == region.mask[cells].tolist()
     assert {True, False} == set(judged)
 
@@ -127,7 +123,7 @@ def test_a_region_of_higher_confidence_is_wider() -> None:
     surface = explored(0.05)
     half, most = (
         find_optimum(
-            PlaneStudy(CampaignSettings.model_validate({"optimum": {"confidence": confidence}})),
+            plane_study(optimum={"confidence": confidence}),
             surface,
             aim(20.0),
         ).region.fraction
@@ -137,11 +133,10 @@ def test_a_region_of_higher_confidence_is_wider() -> None:
 
 
 def test_a_surface_without_slope_is_a_plateau() -> None:
-    strict = CampaignSettings.model_validate({"surface": {"reduce_alpha": 1e-6}})
-    surface, named = explored(0.0, campaign=strict), PlaneStudy()
+    surface, named = explored(0.0, surface={"reduce_alpha": 1e-6}), plane_study()
     assert surface.leading.reduced.terms == ()
     with pytest.raises(StageEnd) as end:
         require_slope(named, surface)
     assert end.value.outcome is Outcome.PLATEAU
-    assert "Around friction E (E) 1, friction F (F) 1 no term" in end.value.reason
+    assert "Around parameter E (E) 1, parameter F (F) 1 no term" in end.value.reason
     require_slope(named, explored(3.0))

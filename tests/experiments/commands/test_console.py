@@ -124,17 +124,6 @@ def test_a_strange_folder_is_named_as_it_is(calibrate: Callable[..., tuple[int, 
     assert "\u202e" not in err
 
 
-@pytest.mark.parametrize("place", ["link", "file/out", "o" * 300])
-def test_a_folder_that_cannot_be_made_is_refused(
-    calibrate: Callable[..., tuple[int, str]], tmp_path: Path, place: str
-) -> None:
-    (tmp_path / "link").symlink_to(tmp_path / "nowhere" / "at all")
-    (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    code, err = calibrate(raising(AssertionError()), place)
-    assert code == 2
-    assert place in err
-
-
 def test_control_characters_of_a_study_never_reach_the_terminal(
     write_study: WriteStudy, tmp_path: Path
 ) -> None:

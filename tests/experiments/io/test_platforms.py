@@ -113,9 +113,17 @@ verification.replicates = 4
 ENGINE = f"\n[engine]\ncommand = \"'{sys.executable}' '{CONES}'\"\n"
 
 
+PROGRAM = """
+import atexit, sys
+from experiments.cli import main
+atexit.register(lambda: print("loaded", *sys.modules))
+main()
+"""
+
+
 def run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
     """Run the command line as a process of its own."""
-    command = [sys.executable, "-c", "from experiments.cli import main; main()", *words]
+    command = [sys.executable, "-c", PROGRAM, *words]
     settings = os.environ | {"PYTHONPATH": str(ROOT), **environment}
     return subprocess.run(command, cwd=folder, env=settings, capture_output=True, check=False)
 
@@ -134,6 +142,9 @@ def test_a_campaign_runs_in_new_processes_under_a_bare_locale(tmp_path: Path, sm
     assert results["study"]["file"] == "Weizen groß.toml"
     assert results["campaign"]["outcome"] == "calibrated"
     assert (folder / "aus gabe ü" / "report.html").read_text(encoding="utf-8").rstrip().endswith("</html>")
+    loaded = done.stdout.decode("utf-8", "replace").rpartition("loaded ")[2].split()
+    assert not {"dask", "distributed", "dask_jobqueue"} & set(loaded)
+    assert "experiments.cli" in loaded
     # No file of ours is opened in an encoding that the system chooses.
     ours = tuple(str(ROOT / package) for package in PACKAGES)
     assert [

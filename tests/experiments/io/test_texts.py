@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from commandline import dem_warp
+from commandline import refused
 
 from dem_warp.device import resolve_device
 from experiments.cli import app
@@ -111,9 +111,7 @@ def test_brackets_are_no_markup(capsys: pytest.CaptureFixture[str]) -> None:
     row = {"picture": "heap[bold].png", "left": 1.0, "right": 1.0, "mean": 1.0, "se": 0.1, "doubts": []}
     print_angles([row], "flank")
     assert "heap[bold].png" in capsys.readouterr().out
-    code, _, err = dem_warp("heap", "[red]none[blue].toml", "--device", "cpu")
-    assert code == 2
-    assert "[red]none[blue].toml" in err
+    assert "[red]none[blue].toml" in refused("heap", "[red]none[blue].toml", "--device", "cpu")
 
 
 def commands() -> dict[str, typer.core.TyperCommand]:

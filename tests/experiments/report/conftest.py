@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from analytic_heaps import Runner, analytic_heaps, study_with
+from analytic_heaps import AnalyticHeaps, study_with
 from discoveries import made_discovery, made_terms
 from plotly.offline import get_plotlyjs
 
@@ -116,8 +116,8 @@ def changed() -> Callable[..., Study]:
 
 
 @pytest.fixture(scope="session")
-def heaps() -> Callable[..., Runner]:
-    return analytic_heaps
+def heaps() -> Callable[..., AnalyticHeaps]:
+    return AnalyticHeaps
 
 
 @pytest.fixture(scope="session")
@@ -132,7 +132,7 @@ def study() -> Study:
 
 @pytest.fixture(scope="session")
 def campaign(study: Study) -> Campaign:
-    return calibrate(study, analytic_heaps())
+    return calibrate(study, AnalyticHeaps())
 
 
 @pytest.fixture(scope="session")

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
+from cone_engine import resting
 from playwright.sync_api import Browser, BrowserContext, Page
 
-from dem_warp import CaseResult
 from doe.discrepancy import Settings, Verdict
 from experiments.calibrate import Campaign, calibrate
 from experiments.report import HeapPicture, SolidHeap, render_page
@@ -53,16 +53,8 @@ class Opened:
 def small_heap() -> SolidHeap:
     """Return a heap of forty clumps of two spheres."""
     place = np.random.default_rng(1).uniform([-0.02, -0.02, 0.002], [0.02, 0.02, 0.012], (40, 3))
-    result = CaseResult(
-        "finished",
-        "",
-        positions=place,
-        orientations=np.tile([0.0, 0.0, 0.0, 1.0], (40, 1)),
-        sizes=np.ones(40),
-        shapes=np.zeros(40, dtype=int),
-        clumps=np.array([[[-0.001, 0.0, 0.0, 0.002], [0.001, 0.0, 0.0, 0.002]]]),
-    )
-    packed = SolidHeap.of("A heap.", result)
+    clump = [[-0.001, 0.0, 0.0, 0.002], [0.001, 0.0, 0.0, 0.002]]
+    packed = SolidHeap.of("A heap.", resting(place, clump))
     assert packed is not None
     return packed
 

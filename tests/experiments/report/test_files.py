@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pandas as pd
 import pytest
+from cone_engine import resting
 
 import dem_warp
 from dem_warp import CaseResult
@@ -59,16 +60,7 @@ def heap_of(angle: float) -> CaseResult:
     x, y, z = (axis.ravel() for axis in np.meshgrid(grid, grid, np.arange(0, 12) * 1.5 * radius))
     inside = z <= rise * (0.04 - np.hypot(x, y))
     centers = np.column_stack([x, y, z + radius])[inside]
-    count = len(centers)
-    return CaseResult(
-        "finished",
-        "",
-        positions=centers,
-        orientations=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
-        sizes=np.ones(count),
-        shapes=np.zeros(count, dtype=int),
-        clumps=np.array([[[0.0, 0.0, 0.0, radius]]]),
-    )
+    return resting(centers, [[0.0, 0.0, 0.0, radius]])
 
 
 def test_pictures_show_the_extremes_of_a_stage_with_their_flanks(

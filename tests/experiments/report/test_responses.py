@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
-from analytic_heaps import study_with
+from analytic_heaps import planes, study_with
 
 from experiments.calibrate import Campaign, calibrate
 from experiments.io.units import Quantity
@@ -20,23 +18,6 @@ from experiments.studyfile import Study, load_study
 POINT = Path(__file__).parents[3] / "experiments" / "studies" / "buckwheat" / "curve_to_point.toml"
 
 
-def analytic(study: Study, table: pd.DataFrame) -> pd.DataFrame:
-    """Heaps and hoppers that are planes of the frictions, with noise from the seed."""
-
-    def case(row: Mapping) -> dict:
-        e, f, g = (float(factor.to_coded(row[factor.name])) for factor in study.factors[:3])
-        noise = np.random.default_rng(row["seed"]).standard_normal(2)
-        facts = {"grain_count": 400.0, "simulated_time": 2.0, "case_key": str(row["seed"])}
-        if row["scene"] == "target":
-            angle, density = 24.0 + 2.0 * e + 5.0 * f + 1.5 * g, 0.55 - 0.012 * e + 0.003 * f - 0.008 * g
-            return facts | {"angle": angle + 0.6 * noise[0], "solid_fraction": density + 0.002 * noise[1]}
-        return facts | {"angle": np.nan, "flow_rate": 0.05 - 0.006 * e - 0.002 * g + 0.001 * noise[0]}
-
-    rows = [case(row) for row in table.to_dict("records")]
-    found = pd.DataFrame(rows, index=table.index).assign(status="finished", reason="", angle_se=0.2)
-    return pd.concat([table, found], axis=1)
-
-
 @pytest.fixture(scope="module")
 def point() -> Study:
     return study_with(load_study(POINT, "bench"), selection={"keep": ("E", "G")})
@@ -44,7 +25,7 @@ def point() -> Study:
 
 @pytest.fixture(scope="module")
 def found(point: Study) -> Campaign:
-    return calibrate(point, lambda table: analytic(point, table))
+    return calibrate(point, lambda table: planes(point, table))
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ import base64
 
 import numpy as np
 import pytest
+from cone_engine import resting
 
 from dem_warp import CaseResult
 from experiments.report import solid
@@ -14,17 +15,8 @@ from experiments.report.solid import MOST_SPHERES, PIXELS, STEPS, SolidHeap
 
 def heap(grains: int, spheres: int = 9) -> CaseResult:
     """Grains of some spheres at random places of a box of 50 mm."""
-    clump = np.tile([0.0, 0.0, 0.0, 0.002], (1, spheres, 1))
-    clump[0, :, 0] = np.linspace(-0.001, 0.001, spheres)
-    return CaseResult(
-        "finished",
-        "",
-        positions=np.random.default_rng(2).uniform(0.0, 0.05, (grains, 3)),
-        orientations=np.tile([0.0, 0.0, 0.0, 1.0], (grains, 1)),
-        sizes=np.ones(grains),
-        shapes=np.zeros(grains, dtype=int),
-        clumps=clump,
-    )
+    clump = [[x, 0.0, 0.0, 0.002] for x in np.linspace(-0.001, 0.001, spheres)]
+    return resting(np.random.default_rng(2).uniform(0.0, 0.05, (grains, 3)), clump)
 
 
 def test_spheres_come_back_as_they_were() -> None:

@@ -101,14 +101,9 @@ def test_plans_tell_what_was_set_aside(
 
 
 def test_a_heap_is_planned_with_its_settings(write_study: Write) -> None:
-    plan = planned_heap(write_study())
+    words = ("heap", write_study(), "--set", "E=0.3", "--device", "cpu", "--dry-run", "--json")
+    plan = json.loads(dem_warp(*words)[1])
     assert plan["cases"] == plan["most"] == 1
-
-
-def planned_heap(study: Path) -> dict:
-    code, out, err = dem_warp("heap", study, "--set", "E=0.3", "--device", "cpu", "--dry-run", "--json")
-    assert code == 0, err
-    return json.loads(out)
 
 
 def test_jobs_are_not_submitted_for_a_plan(write_study: Write, tmp_path: Path) -> None:

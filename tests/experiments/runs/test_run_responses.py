@@ -12,14 +12,13 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
+from commandline import dem_warp, refused
 
 from dem_warp import CaseResult, Drum, Hopper
 from dem_warp.scenes.drum_surface import STATIONS
 from experiments.calibrate import Campaign, Outcome
 from experiments.cases import OwnWorkers, Store, execute, run_cases
 from experiments.cases.workers import own
-from experiments.cli import app
 from experiments.measurement.case_observables import Observed
 from experiments.runs import calibration as run
 from experiments.runs.choices import measured_study, prepare
@@ -62,15 +61,12 @@ def test_heap_and_bin_are_simulated_together(study: Study, tmp_path: Path) -> No
 
 
 def test_one_case_of_a_further_scene_is_shown_alone(study: Study, tmp_path: Path) -> None:
-    command = ["heap", str(study.file), "--scene", "bin", "--device", "cpu", "--out", str(tmp_path / "one")]
-    shown = CliRunner().invoke(app, [*command, "--json"])
-    found = json.loads(shown.stdout)
-    assert (shown.exit_code, found["scene"], found["angle"]) == (0, "bin", None)
+    words = ("heap", study.file, "--device", "cpu", "--out")
+    code, shown, _ = dem_warp(*words, tmp_path / "one", "--scene", "bin", "--json")
+    found = json.loads(shown)
+    assert (code, found["scene"], found["angle"]) == (0, "bin", None)
     assert found["observable_units"]["discharge_time"] == "s"
-    command[command.index("bin")] = "bim"
-    refused = CliRunner().invoke(app, [*command[:-1], str(tmp_path / "other")])
-    assert refused.exit_code == 2
-    assert "did you mean 'bin'" in refused.stderr
+    assert "did you mean 'bin'" in refused(*words, tmp_path / "other", "--scene", "bim")
     assert not (tmp_path / "other").exists()
 
 
@@ -118,13 +114,18 @@ def calibrated(study: Study, folder: Path) -> Campaign:
     return run.run_calibration(prepared).campaign
 
 
+NO_HEAP = (
+    ('[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n', ""),
+    ('[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', ""),
+)
 DRUM = """
 [scene.drum]
 diameter = "60 mm"
 length = "20 mm"
 rotation_rate = "30 1/min"
 grain_count = 30
-
+"""
+SLOPE = """
 [[response]]
 observable = "dynamic_angle"
 mean = "40 deg"
@@ -135,11 +136,7 @@ n = 5
 
 @pytest.mark.usefixtures("engine")
 def test_a_drums_angle_may_be_the_only_target(write_study: Callable[..., Path], tmp_path: Path) -> None:
-    heap = (
-        '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n',
-        '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n',
-    )
-    study = load_study(write_study(*((text, "") for text in heap), add=DRUM))
+    study = load_study(write_study(*NO_HEAP, add=DRUM + SLOPE))
     measured_study(study)
     found = calibrated(study, tmp_path / "out")
     assert found.outcome in (Outcome.CALIBRATED, Outcome.UNDECIDED)
@@ -163,12 +160,6 @@ def test_a_campaign_of_two_scenes_matches_both(study: Study, tmp_path: Path) -> 
 
 
 PROFILES = """
-[scene.drum]
-diameter = "60 mm"
-length = "20 mm"
-rotation_rate = "30 1/min"
-grain_count = 30
-
 [target]
 observable = "surface"
 profiles = "profiles.csv"
@@ -189,11 +180,7 @@ def test_the_profiles_of_a_drum_may_be_the_only_target(
         for place, height in zip(x, (slope * x + offset + rng.normal(0.0, 0.02, 21)).tolist(), strict=True)
     ]
     (tmp_path / "profiles.csv").write_text("\n".join(["replicate,x,z", *rows]), encoding="utf-8")
-    heap = (
-        '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n',
-        '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n',
-    )
-    study = measured_study(load_study(write_study(*((text, "") for text in heap), add=PROFILES)))
+    study = measured_study(load_study(write_study(*NO_HEAP, add=DRUM + PROFILES)))
     names = [response.name for response in study.target.responses]
     # Stations from -0.6 to 0.6 of 30 mm lie within the 20 mm that were measured.
     assert names == [f"surface_mode_{number}" for number in range(1, 8)]

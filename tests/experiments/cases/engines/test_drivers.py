@@ -5,13 +5,13 @@ Tests marked with a `program` run it, and are left out where it is not installed
 
 from __future__ import annotations
 
-import stat
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import install
 
 from dem_warp import CaseResult
 from dem_warp.laws.conventions import PRESETS
@@ -52,15 +52,13 @@ def liggghts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_study: Study
     test = ExportedTest("Small", small_study.case({}, 1), "small.toml")
     translation = export_input(test, "liggghts", approximate=True)
     folder = tmp_path / "bin"
-    folder.mkdir()
     monkeypatch.setenv("PATH", str(folder))
 
-    def install(way: str = "") -> None:
-        program = folder / translation.command[0]
-        program.write_text(DUMPING.format(python=sys.executable, way=way, heap=translation.heap))
-        program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    def put(way: str = "") -> None:
+        text = DUMPING.format(python=sys.executable, way=way, heap=translation.heap)
+        install(folder / translation.command[0], text)
 
-    return install
+    return put
 
 
 def test_a_driver_runs_the_exported_input_and_reads_its_heap(

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from commandline import dem_warp
+from commandline import install, refused
 
 from experiments.cases import Resources
 from experiments.cases.workers import dask_workers
@@ -38,24 +38,14 @@ def profile(tmp_path: Path) -> Path:
     return file
 
 
-def install(folder: Path, script: str) -> Path:
-    """Make a folder with an sbatch."""
-    folder.mkdir()
-    program = folder / "sbatch"
-    program.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
-    program.chmod(0o755)
-    return folder
-
-
 def test_without_the_command_that_submits_nothing_is_written(
     write_study: Callable[..., Path], profile: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path / "empty"))
     study, out = write_study(), tmp_path / "out"
     for command in ("calibrate", "heap"):
-        code, _, err = dem_warp(command, study, "--cluster", profile, "--out", out)
-        assert code == 2
-        assert "needs the command sbatch, which is not on the PATH" in " ".join(err.split())
+        said = refused(command, study, "--cluster", profile, "--out", out)
+        assert "needs the command sbatch, which is not on the PATH" in said
         assert not out.exists()
     assert not (tmp_path / "shared").exists()
 
@@ -64,7 +54,10 @@ def test_jobs_that_are_refused_end_the_command_in_the_message_of_the_batch_syste
     write_study: Callable[..., Path], profile: Path, tmp_path: Path
 ) -> None:
     """A process of its own, as Dask would print its tracebacks when that ends."""
-    path, out = install(tmp_path / "bin", f"echo '{REFUSES}' >&2; exit 1"), tmp_path / "out"
+    path, out = (
+        install(tmp_path / "bin" / "sbatch", f"#!/bin/sh\necho '{REFUSES}' >&2; exit 1"),
+        tmp_path / "out",
+    )
     words = ["calibrate", str(write_study()), "--cluster", str(profile), "--out", str(out)]
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, *words],
@@ -86,7 +79,7 @@ def test_ctrl_c_ends_a_command_whose_jobs_wait_as_any_other(
 ) -> None:
     taken = tmp_path / "taken"
     os.mkfifo(taken)
-    path = install(tmp_path / "bin", f"echo yes > {taken}; echo Submitted batch job 7")
+    path = install(tmp_path / "bin" / "sbatch", f"#!/bin/sh\necho yes > {taken}; echo Submitted batch job 7")
     (path / "scancel").symlink_to("/bin/true")
     words = ["calibrate", str(write_study()), "--cluster", str(profile), "--out", str(tmp_path / "out")]
     # what a test is started from may ignore Ctrl-C
@@ -162,7 +155,7 @@ def test_the_doctor_says_whether_jobs_can_be_submitted(
     [missing] = _submission(asked)
     assert (missing.good, missing.needed) == (False, True)
     assert "no sbatch on the PATH" in missing.text
-    install(tmp_path / "bin", "exit 0")
+    install(tmp_path / "bin" / "sbatch", "#!/bin/sh")
     [there] = _submission(asked)
     assert (there.good, there.text) == (True, str(tmp_path / "bin" / "sbatch"))
     assert _submission(Resources(cluster=ClusterSection(workers=2, gpu=False))) == []

@@ -1,7 +1,6 @@
 """The proof that a card travels: its cards, its comparison on drawn truth, and that it goes on."""
 
 import shutil
-import stat
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from commandline import install
 
 from experiments.evidence.accuracy.travel import travel_heaps as travel
 from experiments.evidence.accuracy.travel.__main__ import RECORD
@@ -142,11 +142,8 @@ def test_an_input_is_the_same_whatever_the_processor_rounds() -> None:
 
 
 def test_a_run_is_measured_stored_and_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    programs = tmp_path / "bin"
-    programs.mkdir()
-    program = programs / "liggghts"
-    program.write_text(PROGRAM.format(python=sys.executable), encoding="utf-8")
-    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    program = tmp_path / "bin" / "liggghts"
+    programs = install(program, PROGRAM.format(python=sys.executable))
     out = tmp_path / "out"
     run_theirs(out, ["liggghts"], ["sphere-low"], [1, 2], 2, programs)
     stored = stored_heaps(out)
@@ -164,11 +161,7 @@ def test_a_run_is_measured_stored_and_not_repeated(tmp_path: Path, monkeypatch: 
 
 
 def test_a_run_without_a_heap_has_a_reason(tmp_path: Path) -> None:
-    programs = tmp_path / "bin"
-    programs.mkdir()
-    program = programs / "lmp"
-    program.write_text("#!/bin/sh\necho ERROR: lost\nexit 1\n", encoding="utf-8")
-    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    programs = install(tmp_path / "bin" / "lmp", "#!/bin/sh\necho ERROR: lost\nexit 1\n")
     run_theirs(tmp_path, ["lammps"], ["rod-low"], [1], 1, programs)
     [found] = stored_heaps(tmp_path)
     assert found.angle is None
@@ -178,10 +171,6 @@ def test_a_run_without_a_heap_has_a_reason(tmp_path: Path) -> None:
 
 
 def test_a_run_that_somebody_has_ended_is_no_heap_and_no_failure(tmp_path: Path) -> None:
-    programs = tmp_path / "bin"
-    programs.mkdir()
-    program = programs / "lmp"
-    program.write_text("#!/bin/sh\nkill -TERM $$\n", encoding="utf-8")
-    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    programs = install(tmp_path / "bin" / "lmp", "#!/bin/sh\nkill -TERM $$\n")
     run_theirs(tmp_path, ["lammps"], ["rod-low"], [1], 1, programs)
     assert stored_heaps(tmp_path) == []

@@ -1,7 +1,6 @@
 """Comparisons with other codes: their input for a column, and the reading of their answers. None is run."""
 
 import json
-import stat
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
+from commandline import install as write_program
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
@@ -100,16 +100,10 @@ def column(small_columns: Columns) -> Moment:
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[PeerName, str], None]:
     """Put a program in the place of a peer's; no other is found."""
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    monkeypatch.setenv("PATH", str(folder))
-
-    def put(name: PeerName, text: str) -> None:
-        program = folder / PEERS[name].program
-        program.write_text(text.replace("{python}", sys.executable), encoding="utf-8")
-        program.chmod(program.stat().st_mode | stat.S_IXUSR)
-
-    return put
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    return lambda name, text: write_program(
+        tmp_path / "bin" / PEERS[name].program, text.replace("{python}", sys.executable)
+    )
 
 
 Install = Callable[[PeerName, str], None]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from analytic_heaps import analytic_heaps, study_with
+from analytic_heaps import AnalyticHeaps, study_with
 
 from experiments.calibrate import Campaign, calibrate
 from experiments.evidence.studies.buckwheat.records import paper_record
@@ -50,7 +50,7 @@ def study() -> Study:
 
 @pytest.fixture(scope="module")
 def campaign(study: Study) -> Campaign:
-    return calibrate(study, analytic_heaps())
+    return calibrate(study, AnalyticHeaps())
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,10 @@
 """The record of what further responses buy: gathered, and its page written anew from the cases."""
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
 import pytest
+from analytic_heaps import planes
 
 from experiments.calibrate import Campaign, calibrate
 from experiments.evidence.studies.buckwheat.records import point_record
@@ -20,22 +18,6 @@ from experiments.evidence.studies.buckwheat.records.point_record import (
 )
 from experiments.io.errors import InputError
 from experiments.studyfile import Study, load_study
-
-
-def planes(study: Study, table: pd.DataFrame) -> pd.DataFrame:
-    """Heaps and hoppers whose responses are planes of two frictions, with noise from the seed."""
-
-    def case(row: Mapping) -> dict:
-        e, f = (float(factor.to_coded(row[factor.name])) for factor in study.factors[:2])
-        noise = np.random.default_rng(row["seed"]).standard_normal(2)
-        if row["scene"] == "target":
-            density = 0.55 - 0.02 * e + 0.002 * noise[1]
-            return {"angle": 24.0 + 2.0 * e + 5.0 * f + 0.5 * noise[0], "solid_fraction": density}
-        return {"angle": np.nan, "flow_rate": 0.05 - 0.006 * e + 0.001 * noise[0]}
-
-    rows = pd.DataFrame([case(row) for row in table.to_dict("records")], index=table.index)
-    facts = {"status": "finished", "reason": "", "grain_count": 400.0, "simulated_time": 2.0}
-    return pd.concat([table, rows], axis=1).assign(**facts)
 
 
 @pytest.fixture(scope="module")

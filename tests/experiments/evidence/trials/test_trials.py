@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import synthetic_world as synthetic
+from discoveries import made_discovery
 
 from doe.design.factors import Factor
 from doe.discrepancy import (
     Analysis,
     Calibration,
-    Data,
     Discovery,
-    Effort,
     MechanismRange,
     Outcomes,
     Point,
@@ -177,26 +176,7 @@ def counting(name: str) -> Analysis:
 
 
 def ended(reason: str) -> Discovery:
-    empty = np.zeros((1, 1))
-    data = Data(("base",), ("first",), (False,), empty, empty, empty.astype(int))
-    return Discovery(
-        verdict=Verdict.NONE,
-        reason=reason,
-        named=(),
-        factors=("mu",),
-        data=data,
-        base=None,
-        chosen=None,
-        gap=None,
-        drifts=(),
-        candidates=(),
-        power=(),
-        confounding=None,
-        before_after=(),
-        next_experiment=None,
-        notes=(),
-        effort=Effort(1, "", 0, 0),
-    )
+    return replace(made_discovery(Verdict.NONE), reason=reason)
 
 
 def expected_reason(number: int) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import dem_warp
+from commandline import dem_warp, refused
 from scipy.spatial import cKDTree
 
 from experiments.grains.spheres import read_spheres
@@ -159,8 +159,7 @@ def dump_with(line: str, replacement: str) -> str:
 def test_a_wrong_file_is_refused_with_its_place(tmp_path: Path, text: str, rule: str, place: str) -> None:
     path = tmp_path / "heap"
     path.write_text(text, "utf-8")
-    code, out, err = dem_warp("angle", path)
-    assert (code, out) == (2, "")
+    err = refused("angle", path)
     assert rule in err
     assert f"{path}, {place}" in err if place != "heap" else str(path) in err
 
