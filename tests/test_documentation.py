@@ -3,8 +3,6 @@
 ``.ci/run`` runs the pages that take seconds, ``.ci/docs`` all; what it noted of the others is held to here.
 """
 
-from __future__ import annotations
-
 import ast
 import json
 import re

@@ -1,5 +1,6 @@
-"""Containers and the conda recipe say what pyproject.toml says."""
+"""Facts in two files of the project are the same in both: its libraries, versions, license and commands."""
 
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -9,6 +10,8 @@ PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PROJECT, BUILD = PYPROJECT["project"], PYPROJECT["build-system"]
 RECIPE = (ROOT / "packaging" / "conda" / "recipe.yaml").read_text(encoding="utf-8")
 DOCKERFILE = (ROOT / "packaging" / "Dockerfile").read_text(encoding="utf-8")
+RECORD = ROOT / "experiments/evidence/studies/buckwheat/record/provenance.json"
+PROMISED = [line.rpartition(" ")[2] for line in PROJECT["classifiers"] if ":: Python :: 3." in line]
 ON_CONDA = {"matplotlib": "matplotlib-base", "opencv-python-headless": "py-opencv"}
 
 
@@ -40,9 +43,8 @@ def test_the_recipe_is_of_this_version() -> None:
 
 
 def test_the_container_runs_a_version_of_python_that_is_promised() -> None:
-    promised = [line.rpartition(" ")[2] for line in PROJECT["classifiers"] if ":: Python :: 3." in line]
     [version] = re.findall(r"^ARG PYTHON=(.+)$", DOCKERFILE, re.MULTILINE)
-    assert version in promised
+    assert version in PROMISED
 
 
 def test_the_container_has_the_stages_that_are_named() -> None:
@@ -55,6 +57,30 @@ def test_the_container_has_the_stages_that_are_named() -> None:
     assert re.findall(r"^USER (\w+)$", DOCKERFILE, re.MULTILINE) == ["65534"]
 
 
-def test_the_gate_runs_on_three_systems() -> None:
+def pins(name: str) -> dict[str, str]:
+    lines = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8").splitlines()
+    return dict(line.split("==") for line in lines if not line.startswith("#"))
+
+
+def test_the_citation_names_the_version() -> None:
+    assert f"\nversion: {PROJECT['version']}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_the_records_versions_are_those_of_its_provenance() -> None:
+    versions = json.loads(RECORD.read_text(encoding="utf-8"))["versions"]
+    del versions["python"]
+    assert pins("record") == versions
+
+
+def test_every_library_that_is_declared_is_pinned() -> None:
+    wanted = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["test"]]
+    assert {re.split(r"[^\w-]", requirement)[0] for requirement in wanted} <= set(pins("tested"))
+
+
+def test_the_gate_runs_on_three_systems_and_the_versions_of_python_that_are_promised() -> None:
     gate = (ROOT / ".github" / "workflows" / "gate.yml").read_text(encoding="utf-8")
     assert {"ubuntu-latest", "macos-latest", "windows-latest"} <= set(re.findall(r"\w+-latest", gate))
+    matrix = re.search(r"^ +python: \[(.+)\]$", gate, re.MULTILINE)
+    assert matrix is not None
+    assert re.findall(r'"([\d.]+)"', matrix[1]) == PROMISED
+    assert PROJECT["requires-python"] == f">={PROMISED[0]}"

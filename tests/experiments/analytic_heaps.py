@@ -1,7 +1,5 @@
 """Campaigns on analytic heaps: the angle is a function of the settings, with noise from the case's seed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

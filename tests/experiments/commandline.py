@@ -1,7 +1,5 @@
 """The command line in process, and programs that stand in for others."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from typer.testing import CliRunner

@@ -1,7 +1,5 @@
 """An engine for tests: cones whose angle follows the friction; it notes the seeds that it simulates."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

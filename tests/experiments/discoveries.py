@@ -1,7 +1,5 @@
 """Discoveries with known numbers, one a verdict, for the tests of their page."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """An emulator in the place of the simulator: heaps and fresh runs of a world that it knows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

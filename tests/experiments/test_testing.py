@@ -1,7 +1,5 @@
 """Conformance tests of engines and exporters: ours and those of a plugin pass, wrong ones fail."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Packages as a user has them: built, installed in a folder, run without the tree."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

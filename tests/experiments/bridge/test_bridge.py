@@ -1,7 +1,5 @@
 """A bridge to another solver: corrected, verified, written as a card, and refused where it cannot be."""
 
-from __future__ import annotations
-
 import json
 import sys
 import tomllib

@@ -1,7 +1,5 @@
 """Campaigns on whole profiles: analytic heaps whose outlines are known, measured or of hidden settings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Campaigns on several responses: analytic cases of two scenes, with known answers."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace

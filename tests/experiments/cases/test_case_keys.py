@@ -1,7 +1,5 @@
 """Cases of the shipped studies: each has the bits that it had when the keys were written down."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import random

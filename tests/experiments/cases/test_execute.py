@@ -1,7 +1,5 @@
 """Tables of cases: what is simulated, what is kept, and how failures come back."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -98,18 +96,6 @@ def test_two_equal_rows_are_one_case(small_study: Study, engine: Engine, tmp_pat
     assert results["angle"].iloc[0] == results["angle"].iloc[1]
 
 
-def test_an_interrupted_batch_keeps_what_had_finished(
-    small_study: Study, engine: Engine, tmp_path: Path
-) -> None:
-    engine.interrupt_after = 2
-    with pytest.raises(KeyboardInterrupt):
-        run_cases(small_study, table_of([0.3, 0.4, 0.5, 0.6]), Store(tmp_path))
-    engine.interrupt_after = None
-    results = run_cases(small_study, table_of([0.3, 0.4, 0.5, 0.6]), Store(tmp_path))
-    assert [[case.seed for case in batch] for batch in engine.batches] == [[10, 20, 30, 40], [10, 20]]
-    assert results["angle"].is_monotonic_increasing
-
-
 def test_checkpoints_outlive_an_interruption_and_no_more(
     small_study: Study, engine: Engine, tmp_path: Path
 ) -> None:
@@ -124,6 +110,7 @@ def test_checkpoints_outlive_an_interruption_and_no_more(
     assert left.exists()
     engine.interrupt_after = None
     run_cases(small_study, table_of([0.3, 0.5]), store)
+    assert [[case.seed for case in batch] for batch in engine.batches] == [[10, 20], [10]]
     assert not store.unfinished.exists()
     assert len(list(store.folder.iterdir())) == 2
 

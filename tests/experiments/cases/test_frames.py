@@ -1,7 +1,5 @@
 """Frames and pictures that ``dem-warp heap`` leaves: read back with VTK, and measured again."""
 
-from __future__ import annotations
-
 import json
 import xml.etree.ElementTree as ET
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The table of outcomes: what was changed in its file is never read as a value."""
 
-from __future__ import annotations
-
 import random
 import sqlite3
 from pathlib import Path
@@ -26,10 +24,14 @@ def table(tmp_path: Path) -> OutcomeTable:
     return table
 
 
-def test_what_was_saved_is_loaded(table: OutcomeTable) -> None:
-    found = table.load([*OUTCOMES, "absent"])
-    assert list(found) == list(OUTCOMES)
-    for key, (values, reason) in OUTCOMES.items():
+def test_what_was_saved_last_is_loaded(table: OutcomeTable) -> None:
+    # More than one query asks for.
+    rows = {f"{i}": (np.array([i, np.nan]), "clogged" if i % 2 else "") for i in range(1200)}
+    table.save(rows | {"3": (np.zeros(2), "clogged")})
+    table.save({"3": rows["3"]})
+    found = OutcomeTable(table.path).load([*OUTCOMES, "absent", *rows])
+    assert found.keys() == {*OUTCOMES, *rows}
+    for key, (values, reason) in (OUTCOMES | rows).items():
         np.testing.assert_array_equal(found[key][0], values)
         assert found[key][1] == reason
 

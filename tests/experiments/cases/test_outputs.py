@@ -1,9 +1,6 @@
 """The outputs of a folder: all of one study, listed last; one run at a time, and no links."""
 
-from __future__ import annotations
-
 import json
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -190,26 +187,6 @@ def test_a_file_where_the_stored_cases_belong_is_refused(folder: Path, small_stu
     publish(folder, small_study, "report.html")
     (folder / "cases").write_text("mine", encoding="utf-8")
     with pytest.raises(StoreError, match="must be the folder of the stored cases"):
-        open_folder(folder, small_study, resume=True)
-
-
-def test_one_run_at_a_time_works_in_a_folder(folder: Path, small_study: Study) -> None:
-    refused: list[str] = []
-
-    def second() -> None:
-        try:
-            with locked(folder, resume=True):
-                pass
-        except StoreError as error:
-            refused.append(str(error))
-
-    with locked(folder):
-        open_folder(folder, small_study)
-        other = threading.Thread(target=second)
-        other.start()
-        other.join()
-    assert "another run is using this folder" in refused[0]
-    with locked(folder, resume=True):
         open_folder(folder, small_study, resume=True)
 
 

@@ -1,7 +1,5 @@
 """The store and the output folder: nothing half-written is read, nothing overwritten, changes are named."""
 
-from __future__ import annotations
-
 import dataclasses
 import errno
 from collections.abc import Callable
@@ -40,23 +38,16 @@ def test_a_result_comes_back_bit_for_bit(tmp_path: Path, cone: Cone) -> None:
     assert store.has("k")
 
 
-def test_what_determines_a_case_makes_its_key(tmp_path: Path, small_study: Study) -> None:
-    store = Store(tmp_path)
-    key = store.key(small_study.case({"E": 0.3}, seed=1))
-    assert key == Store(tmp_path / "elsewhere").key(small_study.case({"E": 0.3}, seed=1))
-    others = {
-        store.key(small_study.case({"E": value}, seed)) for value, seed in ((0.3, 2), (0.31, 1), (0.2, 1))
-    }
-    assert len(others | {key}) == 4
-
-
-def test_another_engine_makes_another_key(
+def test_what_determines_a_case_makes_its_key(
     tmp_path: Path, small_study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store, case = Store(tmp_path), small_study.case({}, seed=1)
-    key = store.key(case)
+    def key(friction: float = 0.3, seed: int = 1, folder: str = "here") -> str:
+        return Store(tmp_path / folder).key(small_study.case({"E": friction}, seed))
+
+    assert key() == key(folder="elsewhere")
+    others = {key(), key(seed=2), key(0.31), key(0.2)}
     monkeypatch.setattr(key_module, "engine_fingerprint", lambda *_: "another")
-    assert store.key(case) != key
+    assert len({*others, key()}) == 5
 
 
 def with_moved_spheres(case: Case, shape: ClumpShape, move: Callable[[float], float]) -> Case:
@@ -101,25 +92,29 @@ def test_an_absent_case_is_absent(tmp_path: Path) -> None:
     assert not store.folder.exists()
 
 
-@pytest.mark.parametrize("at", [0.0, 0.5, 0.999])
-def test_a_file_cut_short_is_named_and_not_read(tmp_path: Path, cone: Cone, at: float) -> None:
+def flipped(data: bytes) -> bytes:
+    changed = bytearray(data)
+    changed[len(data) // 2] ^= 1
+    return bytes(changed)
+
+
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda data: b"",
+    "half": lambda data: data[: len(data) // 2],
+    "all but the end": lambda data: data[: int(0.999 * len(data))],
+    "a flipped bit": flipped,
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_file_is_named_and_not_read(tmp_path: Path, cone: Cone, damage: str) -> None:
     store = Store(tmp_path)
     store.save("k", cone())
-    data = store.path("k").read_bytes()
-    store.path("k").write_bytes(data[: int(at * len(data))])
+    store.path("k").write_bytes(DAMAGES[damage](store.path("k").read_bytes()))
     assert not store.has("k")
     assert str(store.path("k")) in (store.damage("k") or "")
     with pytest.raises(StoreError):
         store.load("k")
-
-
-def test_a_flipped_bit_is_found(tmp_path: Path, cone: Cone) -> None:
-    store = Store(tmp_path)
-    store.save("k", cone())
-    data = bytearray(store.path("k").read_bytes())
-    data[len(data) // 2] ^= 1
-    store.path("k").write_bytes(data)
-    assert not store.has("k")
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -1,7 +1,5 @@
 """Tests that leave no heap: alone, in a search, from a file, with walls of several materials."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

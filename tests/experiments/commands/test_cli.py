@@ -1,7 +1,5 @@
 """The command line, run as a person runs it: exit codes, messages, and what is (not) written."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """``dem-warp clump``: units, tolerances, advice, pictures."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Errors of the machine, signals and strange names: each ends in a message, an exit code and a way out."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal

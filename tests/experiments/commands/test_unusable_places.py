@@ -1,7 +1,5 @@
 """Places that results cannot go to: each command ends with 2 before it works, and leaves nothing."""
 
-from __future__ import annotations
-
 import errno
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``dem-warp discover``, run as a person runs it on the trial study and its shipped bank."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -9,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commandline import dem_warp
 from emulated import EmulatedSimulator, emulated_heaps
-from typer.testing import CliRunner
 
 from dem_warp import CaseResult
 from doe.discrepancy import Outcomes, Point, fit_emulator
-from experiments.cli import app
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.search import Search
 from experiments.runs.choices import measured_study, prepare
@@ -30,12 +27,9 @@ STUDY = TRIAL / "study.toml"
 DATA = Path(__file__).parent / "data"
 
 
-def discover(*arguments: object, device: str = "cpu") -> tuple[int, str, str]:
-    """Run the command at bench scale; return its exit code, standard output and standard error."""
-    words = ["discover", str(STUDY), *map(str, arguments), "--scale", "bench", "--device", device]
-    result = CliRunner().invoke(app, words)
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result.exit_code, result.stdout, result.stderr
+def discover(*arguments: object) -> tuple[int, str, str]:
+    """Run the command at bench scale."""
+    return dem_warp("discover", STUDY, *arguments, "--scale", "bench", "--device", "cpu")
 
 
 def test_a_search_builds_its_study_and_each_condition_when_a_file_is_read_alone(

@@ -1,7 +1,5 @@
 """A search on drums: speeds, inclinations and wall materials as conditions, whole surfaces among the data."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 

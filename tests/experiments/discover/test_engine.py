@@ -1,7 +1,5 @@
 """The engine as a simulator: its answers, what it keeps, and points that it refuses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -15,7 +13,6 @@ from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.workers import own
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
-from experiments.io.errors import StoreError
 from experiments.measurement.case_observables import measure
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import NAMES
@@ -178,22 +175,3 @@ def test_everything_that_determines_an_outcome_is_in_its_key(
     finer = build(load_study(write_study(("pixels = 200", "pixels = 300"), add=CONDITIONS)), table)
     keys |= {finer.key(finer.case(POINTS[0]))}
     assert len(keys) == len(points) + 1
-
-
-def test_a_table_gives_back_what_was_saved(table: OutcomeTable) -> None:
-    # More than one query asks for.
-    rows = {f"{i}": (np.array([i, np.nan]), "clogged" if i % 2 else "") for i in range(1200)}
-    table.save(rows)
-    table.save({"3": (np.array([-3.0, 0.0]), "")})
-    found = OutcomeTable(table.path).load([*rows, "not there"])
-    assert found.keys() == rows.keys()
-    np.testing.assert_array_equal(found["3"][0], [-3.0, 0.0])
-    np.testing.assert_array_equal(found["1199"][0], [1199.0, np.nan])
-    assert (found["1199"][1], found["4"][1]) == ("clogged", "")
-
-
-def test_a_file_that_is_no_table_is_refused(table: OutcomeTable) -> None:
-    table.path.parent.mkdir()
-    table.path.write_text("something else" * 100)
-    with pytest.raises(StoreError, match="is not a table of outcomes"):
-        table.load(["1"])

@@ -3,8 +3,6 @@
 The truth is the emulator of the bank, so that nothing is simulated; what an emulator misses is no part of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache

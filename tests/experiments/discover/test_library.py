@@ -1,7 +1,5 @@
 """The library of mechanisms, each alone and in a study."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

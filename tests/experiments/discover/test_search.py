@@ -1,7 +1,5 @@
 """Settings of a search before the data are opened, and the banks that it may use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

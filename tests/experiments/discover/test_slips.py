@@ -1,7 +1,5 @@
 """Slips in measured data, on the shipped bank: found before anything else, named, and left out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

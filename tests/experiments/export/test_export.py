@@ -1,7 +1,5 @@
 """Contact terms of other codes: closed forms of the same contact, in their words."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

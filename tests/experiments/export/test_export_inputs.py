@@ -1,21 +1,18 @@
 """Inputs of other codes: the same test in their words, refused by name where they lack something, and run."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
 import math
 import re
 import subprocess
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commandline import dem_warp, refused
 
 from dem_warp import (
     PRESETS,
@@ -32,13 +29,12 @@ from dem_warp import (
 from dem_warp.laws.conventions import Rolling
 from dem_warp.laws.twisting import Twisting
 from dem_warp.population import SIZE_VARIANCE
-from experiments.cli import app
 from experiments.export import EXPORTERS, ExportedTest, case_terms, export_input, term_warnings, write_export
 from experiments.export.lammps_exporter import grains_at_once
 from experiments.export.lift import Lift, disc, prism
 from experiments.export.sizes import size_classes
 from experiments.io.errors import InputError
-from experiments.studyfile import StudyError, load_card, load_study
+from experiments.studyfile import load_study
 
 GRAIN = Material(density=1000.0, shear_modulus=3e5, poisson_ratio=0.25)
 WALL = Material(density=7800.0, shear_modulus=7e10, poisson_ratio=0.3)
@@ -233,6 +229,8 @@ def test_a_law_that_the_code_lacks_is_refused_or_told_at_the_top(tmp_path: Path)
     test = exported("edem")
     with pytest.raises(InputError, match=r"law rolling = 'own_spin': LIGGGHTS lacks it; using 'cdt'"):
         export_input(test, "liggghts")
+    with pytest.raises(InputError, match=r"rolling = 'epsd2'"):
+        export_input(exported("liggghts"), "yade")
     translation = export_input(test, "liggghts", approximate=True)
     write_export(test, "liggghts", translation, tmp_path)
     head = (tmp_path / "lift.in").read_text().splitlines()[1:4]
@@ -254,31 +252,21 @@ def test_a_mechanism_and_an_option_of_the_scene_without_counterpart_are_refused_
 def test_another_test_and_another_code_are_refused() -> None:
     drum = load_study(Path("experiments/studies/trial/study.toml"), "bench").case({}, 1)
     strange = ExportedTest("strange", replace(drum, scene=object()), "here")
-    with pytest.raises(InputError, match="must be a lifted-cylinder"):
-        export_input(strange, "liggghts")
+    for code in ("liggghts", "yade", "deme", "mercurydpm"):
+        with pytest.raises(InputError, match="must be a lifted-cylinder"):
+            export_input(strange, code)
     with pytest.raises(InputError, match=r"must be one of .*liggghts.*got fluent"):
         export_input(exported("edem"), "fluent")
 
 
 def test_the_command_writes_the_folder_and_refuses_with_exit_code_2(tmp_path: Path) -> None:
-    run: Callable = CliRunner().invoke
-    refused = run(app, ["export", "--scale", "bench", "--to", "lammps", "--out", str(tmp_path / "no")])
-    assert refused.exit_code == 2
+    assert refused("export", "--scale", "bench", "--to", "lammps", "--out", tmp_path / "no")
     assert not (tmp_path / "no").exists()
-    words = ["export", "--scale", "bench", "--set", "E=0.4", "--to", "edem", "--json"]
-    done = run(app, [*words, "--out", str(tmp_path / "sheet")])
-    assert done.exit_code == 0
-    assert json.loads(done.stdout)["warnings"] == []
+    words = ("export", "--scale", "bench", "--set", "E=0.4", "--to", "edem", "--json")
+    code, out, _ = dem_warp(*words, "--out", tmp_path / "sheet")
+    assert (code, json.loads(out)["warnings"]) == (0, [])
     assert "| E | 0.4 |" in (tmp_path / "sheet" / "README.md").read_text()
-    again = run(app, [*words, "--out", str(tmp_path / "sheet")])
-    assert again.exit_code == 2
-
-
-def test_a_card_without_its_test_is_refused(tmp_path: Path) -> None:
-    card = tmp_path / "material.toml"
-    card.write_text("[material.grain]\nsphere = '1 mm'\n", encoding="utf-8")
-    with pytest.raises(StudyError, match="lacks the test that it was fitted to"):
-        load_card(card)
+    assert refused(*words, "--out", tmp_path / "sheet")
 
 
 @with_programs

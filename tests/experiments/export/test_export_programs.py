@@ -1,7 +1,5 @@
 """Programs of other codes: the same rain, the same grains, the same course, and walls that close."""
 
-from __future__ import annotations
-
 import ast
 import io
 import json
@@ -18,7 +16,6 @@ from dem_warp import (
     PRESETS,
     Case,
     ClumpShape,
-    DrawDown,
     GrainPopulation,
     Interaction,
     LiftedCylinder,
@@ -36,7 +33,6 @@ from experiments.export import (
 )
 from experiments.export.deme_exporter import obj_text, thick_tube
 from experiments.export.same_rain import template
-from experiments.io.errors import InputError
 
 GRAIN = Material(density=1000.0, shear_modulus=3e5, poisson_ratio=0.25)
 WALL = Material(density=7800.0, shear_modulus=7e10, poisson_ratio=0.3)
@@ -102,13 +98,6 @@ def test_yade_gets_a_contact_for_every_pair(inputs: dict[str, Translation]) -> N
     assert written["materials"][0]["young"] == pytest.approx(2.0 * 3e5 * 1.25 / 4.0)
 
 
-def test_a_law_that_a_code_lacks_is_refused_by_name() -> None:
-    with pytest.raises(InputError, match=r"rolling = 'epsd2'"):
-        export_input(exported("liggghts"), "yade")
-    nearest = export_input(exported("liggghts"), "yade", approximate=True)
-    assert any("attraction" in warning for warning in nearest.warnings)
-
-
 def test_hertz_leaves_for_dem_engine_with_a_modulus_that_gives_its_force() -> None:
     own, hertz = (json.loads(_deme(laws).files["test.json"]) for laws in ("deme", "liggghts"))
     ratio = own["materials"][0]["E"] / hertz["materials"][0]["E"]
@@ -122,16 +111,6 @@ def _deme(laws: str) -> Translation:
 
 def _case(laws: str) -> Case[Any]:
     return exported(laws).case
-
-
-@pytest.mark.parametrize("code", ["yade", "deme", "mercurydpm"])
-def test_another_test_is_refused(code: str) -> None:
-    case = replace(
-        _case("yade"),
-        scene=DrawDown(width=0.05, depth=0.02, fill_depth=0.02, slot=0.01, drop=0.05, wall_material=WALL),
-    )
-    with pytest.raises(InputError, match="lifted-cylinder"):
-        export_input(ExportedTest("other", case, "a test"), code)
 
 
 def test_a_thick_tube_is_closed_and_faces_the_grains() -> None:

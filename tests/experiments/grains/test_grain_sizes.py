@@ -1,7 +1,5 @@
 """Sizes as they are measured: tables, distributions and shapes, and what is refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files that would take all memory or time, or are no files: each is refused by a stated limit."""
 
-from __future__ import annotations
-
 import os
 import time
 import zipfile

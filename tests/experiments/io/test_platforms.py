@@ -1,7 +1,5 @@
 """Demands on the CPU's path of Windows, macOS and a bare C locale, as far as one machine shows it."""
 
-from __future__ import annotations
-
 import ast
 import json
 import os

@@ -1,7 +1,5 @@
 """Texts as people's programs write them: marks, encodings, commas, units, brackets."""
 
-from __future__ import annotations
-
 import math
 import re
 import time

@@ -1,7 +1,5 @@
 """The version that a run reports, also in a tree that is not installed."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Folders of runs, as the tests of the pages watch them."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack

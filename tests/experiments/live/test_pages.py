@@ -1,7 +1,5 @@
 """The pages in headless Chromium: what they show of runs, without an error and without a look elsewhere."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager

@@ -1,7 +1,5 @@
 """The server on this machine: who is let in, and what a folder gives away."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket

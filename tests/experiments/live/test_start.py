@@ -1,7 +1,5 @@
 """The page to start from: its answers are those of the commands, and it writes what they take."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import shlex
@@ -210,13 +208,6 @@ def test_photographs_are_measured_as_the_command_does(ask: Ask, upload: Callable
     assert ask("angles", folder="mine-photos", fit="none")["error"]
     for place in ("..", "none", "/etc", ".hidden"):
         assert ask("angles", folder=place, fit="flank")["error"], place
-
-
-def test_a_bad_photograph_is_a_row_with_its_reason(ask: Ask, upload: Callable) -> None:
-    upload("p-photos/a.png", photograph(0.5))
-    upload("p-photos/b.png", b"no picture")
-    rows = ask("angles", folder="p-photos", fit="flank")["rows"]
-    assert [bool(row["reason"]) for row in rows] == [False, True]
 
 
 def test_the_command_line_is_the_one_that_is_called(

@@ -1,7 +1,5 @@
 """States of a run by its folder: waiting, running, finished, failed, interrupted, of an older version."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -1,7 +1,5 @@
 """The reached filling of a drum: printed for a case, and cautioned about in a campaign."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

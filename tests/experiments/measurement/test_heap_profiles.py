@@ -1,7 +1,5 @@
 """Outlines of heaps as profiles: alike from points, pictures, spheres and states; bad ones refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -89,25 +87,12 @@ def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_pat
     ("text", "message"),
     [
         ("1,0 mm,0 mm\n1,1 mm,1 mm\n", r"p.csv:2: .*needs 8 points or more, got 2"),
-        (
-            "".join(f"1,{n} mm,{n} mm\n" for n in range(9)),
-            r"p.csv:2: both ends of .*got 0 and 8 ",
-        ),
+        ("".join(f"1,{n} mm,{n} mm\n" for n in range(9)), r"p.csv:2: both ends of .*got 0 and 8 "),
         ("", r"p.csv: has no rows below the names of the columns"),
         ("1,0 mm,-1 mm\n", r"p.csv:2: z: must be 0 or more"),
         ("1,0,1\n", r"p.csv:2: x: needs a unit of length"),
         ("1,0 mm,1 mm\n1,0 mm,2 mm\n", r"p.csv:3: x: appears twice"),
         ("".join(f"1,{n} mm,0 mm\n" for n in range(9)), r"p.csv:2: .*has no area"),
-    ],
-)
-def test_points_that_are_no_heap_are_refused_with_their_row(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        read_heap_profiles(file(tmp_path, text), "flank", SIZE)
-
-
-@pytest.mark.parametrize(
-    ("row", "message"),
-    [
         ("1,none.png,1 mm\n", r"p.csv:2: picture: no such file"),
         ("1,plain.png,\n", r"p.csv:2: pixel: outlines in a picture need the size of its pixels"),
         ("1,plain.png,0 mm\n", r"p.csv:2: pixel: must be positive"),
@@ -116,13 +101,16 @@ def test_points_that_are_no_heap_are_refused_with_their_row(tmp_path: Path, text
         ("1,top.png,1 mm\n", r"p.csv:2: picture: has no measurable heap"),
     ],
 )
-def test_a_picture_that_shows_no_side_of_a_heap_is_refused(tmp_path: Path, row: str, message: str) -> None:
+def test_what_shows_no_side_of_a_heap_is_refused_with_its_row(
+    tmp_path: Path, text: str, message: str
+) -> None:
     cv2.imwrite(str(tmp_path / "plain.png"), np.full((200, 300), 200, np.uint8))
     top = np.full((400, 600, 3), 220, np.uint8)
     cv2.circle(top, (300, 200), 120, (60, 90, 120), -1)
     cv2.imwrite(str(tmp_path / "top.png"), top)
+    head = "replicate,picture,pixel" if "png" in text else "replicate,x,z"
     with pytest.raises(InputError, match=message):
-        read_heap_profiles(file(tmp_path, row, "replicate,picture,pixel"), "flank", SIZE)
+        read_heap_profiles(file(tmp_path, text, head), "flank", SIZE)
 
 
 def test_a_heap_that_the_test_cannot_give_is_refused_with_file_and_pixel(tmp_path: Path) -> None:

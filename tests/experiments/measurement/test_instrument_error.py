@@ -1,7 +1,5 @@
 """Errors of instruments in a file of measured heaps: stated, usual, or none."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

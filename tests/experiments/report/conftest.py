@@ -1,7 +1,5 @@
 """Campaigns on analytic heaps, and a page taken apart, for the tests of the report."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from functools import cache

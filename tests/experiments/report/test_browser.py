@@ -1,7 +1,5 @@
 """The pages in headless Chromium: light and dark, wide and narrow, on paper, without a network."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The charts hold the numbers of the results."""
 
-from __future__ import annotations
-
 import pytest
 
 from experiments.calibrate import Campaign

@@ -1,7 +1,5 @@
 """Companions: what a study brings to the reports, by its name alone."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every way in which a campaign can end, and every number of kept factors, in the report."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import pytest

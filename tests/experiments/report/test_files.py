@@ -1,7 +1,5 @@
 """The report's files, and its pictures of heaps."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

@@ -1,7 +1,5 @@
 """Material cards: what a campaign found, read back as a study's material."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import replace
 from pathlib import Path

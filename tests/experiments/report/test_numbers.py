@@ -1,7 +1,5 @@
 """Numbers and sentences as a reader expects them."""
 
-from __future__ import annotations
-
 import pandas as pd
 import pytest
 

@@ -1,7 +1,5 @@
 """The page: well formed, self-contained, with the results' own numbers."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Verdict, cautions, values and texts to paste: from a campaign's own numbers, each printed once."""
 
-from __future__ import annotations
-
 import html
 import re
 from collections import Counter

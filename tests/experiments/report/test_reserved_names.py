@@ -1,7 +1,5 @@
 """Factors and the columns of tables: no name has two meanings."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page and the card of a campaign on several responses."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

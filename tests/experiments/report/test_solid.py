@@ -1,7 +1,5 @@
 """Heaps to be turned: packed without a visible loss, small, and left out where no browser could draw them."""
 
-from __future__ import annotations
-
 import base64
 
 import numpy as np

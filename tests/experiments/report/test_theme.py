@@ -1,7 +1,5 @@
 """Colours of pages: every text is read on every ground, in light and in dark."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

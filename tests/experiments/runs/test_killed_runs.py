@@ -1,7 +1,5 @@
 """Each command killed at ten points, started twice in one folder, and resumed to the same results."""
 
-from __future__ import annotations
-
 import json
 import os
 import traceback

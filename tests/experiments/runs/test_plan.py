@@ -1,7 +1,5 @@
 """Plans of ``--dry-run``, and the findings of ``dem-warp doctor``, before anything runs."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A whole calibration in a folder: what it leaves there, and how it goes on after an interruption."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil
@@ -162,22 +160,14 @@ def test_a_script_may_hand_over_a_study_or_its_file(write_study: Callable[..., P
 
 
 @pytest.mark.usefixtures("_without_report")
-def test_a_finished_campaign_is_analysed_again_without_a_case(
-    study: Study, engine: Engine, tmp_path: Path
-) -> None:
-    first = run_campaign(study, tmp_path / "out")
-    count = len(engine.seeds)
-    assert same_findings(run_campaign(study, tmp_path / "out", resume=True), first)
-    assert len(engine.seeds) == count
-
-
-@pytest.mark.usefixtures("_without_report")
-def test_another_replicate_simulates_only_that(
+def test_a_finished_campaign_simulates_nothing_and_another_replicate_only_that(
     write_study: Callable[..., Path], engine: Engine, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     five = load_study(write_study(add="[campaign.noise_floor]\nreplicates = 5\n"))
     first = run_campaign(five, tmp_path / "out")
     count = len(engine.seeds)
+    assert same_findings(run_campaign(five, tmp_path / "out", resume=True), first)
+    assert len(engine.seeds) == count
     six = load_study(write_study(add="[campaign.noise_floor]\nreplicates = 6\n"))
     second = run_campaign(six, tmp_path / "out", resume=True)
     assert "study.campaign.noise_floor.replicates: 5 -> 6" in caplog.text

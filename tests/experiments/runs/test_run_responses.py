@@ -1,7 +1,5 @@
 """Two scenes in one campaign's folder: really simulated, and a whole campaign on a stand-in engine."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable
@@ -56,6 +54,7 @@ def test_heap_and_bin_are_simulated_together(study: Study, tmp_path: Path) -> No
     assert (heap["status"], outflow["status"]) == ("finished", "finished")
     assert 0.0 < heap["angle"] < 90.0
     assert math.isnan(outflow["angle"])
+    assert outflow["reason"] == "", "a bin leaves no heap, and its measurement did not fail"
     assert 0.0 < outflow["discharge_time"] < outflow["simulated_time"]
     assert outflow["filled_mass"] == pytest.approx(outflow["fallen_mass"] + outflow["mass_left"], rel=1e-6)
 

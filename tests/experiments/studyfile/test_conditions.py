@@ -1,7 +1,5 @@
 """Conditions: the same grain tested in other ways."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

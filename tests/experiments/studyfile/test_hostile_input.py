@@ -1,7 +1,5 @@
 """Inputs that no command can use: each ends with 2, prints rule, value and place, and writes nothing."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field

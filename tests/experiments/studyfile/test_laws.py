@@ -1,7 +1,5 @@
 """Laws of a study: by the name of a code, law by law; in its cards, cases, page and template."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Observables of a heap, on drawn truth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

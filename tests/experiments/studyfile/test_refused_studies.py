@@ -1,7 +1,5 @@
 """Studies that cannot be: each is refused with the rule, the key and the line that broke it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Scenes of a study: each in its own table, and the errors of a wrong one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Study files: their meaning in SI, and the errors of a wrong one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Mechanisms in study files."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

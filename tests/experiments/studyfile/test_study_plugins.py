@@ -1,7 +1,5 @@
 """Scenes and mechanisms that the libraries gain: a class and a line, and study files know them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The reference of the study file, and the defaults that the template names."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

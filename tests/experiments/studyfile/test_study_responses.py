@@ -1,21 +1,14 @@
 """Further responses of a study file: their meaning, and the errors of a wrong one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import SimpleNamespace
 
-import pandas as pd
 import pytest
 
 from dem_warp import DrawDown, Drum, Hopper, LiftedCylinder
 from doe import Sample
-from experiments.cases import Store, execute, run_cases
-from experiments.cases.workers import own
 from experiments.io.errors import StudyError
 from experiments.io.units import UNITS
-from experiments.measurement.case_observables import Observed
 from experiments.studyfile import BUCKWHEAT, load_study
 from experiments.studyfile.campaign import Response, Target, Twin
 from experiments.studyfile.observables import DIMENSIONS
@@ -91,32 +84,6 @@ def test_a_case_of_a_further_scene_has_the_same_grains_and_contacts(write_study:
     )
     with pytest.raises(StudyError, match="did you mean 'bin'"):
         study.case({}, seed=1, scene="bim")
-
-
-def test_a_table_is_simulated_each_row_in_its_scene(
-    write_study: WriteStudy, cone: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    simulated = []
-
-    def engine(cases, *, on_result, **_) -> None:
-        simulated.append({case.seed: type(case.scene) for case in cases})
-        for index, _ in enumerate(cases):
-            on_result(index, cone())
-
-    monkeypatch.setattr(own, "simulate", engine)
-    monkeypatch.setattr(
-        execute,
-        "observe",
-        lambda _, result, heap: Observed({"angle": 25.0}, SimpleNamespace(se=0.1)) if heap else Observed(),
-    )
-    study = load_study(write_study(add=RESPONSES))
-    table = pd.DataFrame({"seed": [1, 2, 3], "scene": ["target", "bin", "short"]})
-    found = run_cases(study, table, Store(tmp_path))
-    # one call for all, the costly ones first
-    assert simulated == [{1: LiftedCylinder, 2: Hopper, 3: LiftedCylinder}]
-    # A bin leaves no heap, and its measurement did not fail.
-    assert found["angle"].notna().tolist() == [True, False, True]
-    assert found["reason"].eq("").all()
 
 
 @pytest.mark.parametrize("scale", [None, "bench"])

@@ -1,7 +1,5 @@
 """The folder contract: what a program finds, what it answers, and every way to fail."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

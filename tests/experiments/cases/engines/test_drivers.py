@@ -3,8 +3,6 @@
 Tests marked with a `program` run it, and are left out where it is not installed.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Cases and searches on a program of one's own: kept, repeated where it fails, and refused."""
 
-from __future__ import annotations
-
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -10,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
+from commandline import dem_warp
 
 from experiments.cases import OwnWorkers, Store, engine_of, run_cases
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.cli import app
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
 from experiments.studyfile import load_study
@@ -73,8 +70,7 @@ def test_a_search_asks_a_program_and_keeps_what_it_answers(write_study: Write, t
 
 def test_a_heap_that_cannot_be_drawn_has_a_reason(write_study: Write, tmp_path: Path) -> None:
     study, out = write_study(add=section("high")), tmp_path / "out"
-    result = CliRunner().invoke(app, ["heap", str(study), "--out", str(out), "--device", "cpu"])
-    assert result.exit_code == 1
-    assert "no heap" in result.stderr
+    code, _, err = dem_warp("heap", study, "--out", out, "--device", "cpu")
+    assert (code, "no heap" in err) == (1, True)
     assert (out / "heap.vtp").exists()
     assert not (out / "snapshot.png").exists()

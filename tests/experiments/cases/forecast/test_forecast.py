@@ -1,7 +1,5 @@
 """Forecasts of wall time: work that is predicted, speeds that are noted, and what they say of a batch."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import asdict, replace

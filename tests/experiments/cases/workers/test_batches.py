@@ -1,7 +1,5 @@
 """Batches before they run: predicted costs, what fits a device, and what becomes of a batch that fails."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

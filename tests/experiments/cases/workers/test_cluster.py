@@ -1,7 +1,5 @@
 """Workers of Dask: the same bits for any split, nothing lost and nothing done twice when a worker is."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

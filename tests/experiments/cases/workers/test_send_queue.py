@@ -1,7 +1,5 @@
 """Messages of a worker leave while it simulates: it never waits, all arrive in order, and a client may go."""
 
-from __future__ import annotations
-
 import pickle
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Jobs that cannot be submitted, and addresses that are none: said at once, in plain words."""
 
-from __future__ import annotations
-
 import os
 import select
 import signal

@@ -10,7 +10,6 @@ from experiments.evidence.studies.cellulose import cellulose_campaign, cellulose
 from experiments.evidence.studies.cellulose.cellulose_fit import measured_edge, residual_table, residuals
 from experiments.evidence.studies.cellulose.cellulose_heaps import simulate_drums
 from experiments.evidence.studies.cellulose.cellulose_page import write_record
-from experiments.io.errors import InputError
 from experiments.studyfile import Study
 
 RADIUS_MM = 42.0
@@ -143,11 +142,6 @@ def test_a_measured_edge_has_no_residual():
     row = residual_table(table, curve[None] + 1.0, 1e-3 * RADIUS_MM).iloc[0]
     assert row["rms_mm"] == pytest.approx(1.0)
     assert 40.0 < row["area_mm2"] < 2.0 * np.sqrt(0.6) * RADIUS_MM
-
-
-def test_an_unknown_scale_is_refused(tmp_path):
-    with pytest.raises(InputError, match="must be one of h200, bench"):
-        cellulose_campaign.run_study("paper", tmp_path)
 
 
 def test_a_drum_is_simulated_once(tmp_path, monkeypatch):

@@ -27,18 +27,12 @@ def run(module: str, words: list[str]) -> tuple[int, str]:
     return result.exit_code, result.stderr
 
 
-@pytest.mark.parametrize(
-    ("module", "words"),
-    [
-        ("experiments.evidence.studies.cellulose.__main__", ["run", "--scale", "bench", "--device", "cpu"]),
-        ("experiments.evidence.studies.wheat_drums.__main__", ["run", "--scale", "bench", "--device", "cpu"]),
-    ],
-)
+@pytest.mark.parametrize(("module", "words"), SCRIPTS[:2])
 def test_a_folder_that_is_a_file_is_refused_before_anything_runs(
     module: str, words: list[str], tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("mine", encoding="utf-8")
-    code, err = run(module, [*words, "--out", str(tmp_path / "file")])
+    code, err = run(module, [*words, "--device", "cpu", "--out", str(tmp_path / "file")])
     assert code == 2
     assert str(tmp_path / "file") in err
     assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"

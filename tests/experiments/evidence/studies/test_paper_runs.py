@@ -9,7 +9,6 @@ import pytest
 
 from experiments.evidence.studies.buckwheat.replay.replay import ALL, Replay, published_noise
 from experiments.evidence.studies.buckwheat.replay.runs import (
-    DESIGNS,
     OPTIMUM,
     STAGES,
     planned_cases,
@@ -149,7 +148,3 @@ def test_failed_cases_are_left_out() -> None:
     assert runs.loc[("screening", 4), "n"] == 0
     assert runs.loc[("climb", 2), "n"] == 1
     assert len(replay.screening.response) == 22
-
-
-def test_the_designs_are_the_31_runs() -> None:
-    assert published_runs()["stage"].isin(DESIGNS).sum() == 31

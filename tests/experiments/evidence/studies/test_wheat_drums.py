@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from experiments.evidence.studies.cellulose import cellulose_campaign
 from experiments.evidence.studies.cellulose.__main__ import app as cellulose_app
 from experiments.evidence.studies.wheat_drums import drum_campaign, drum_plan
 from experiments.evidence.studies.wheat_drums.__main__ import app as wheat_app
@@ -139,9 +140,10 @@ def test_the_heap_is_of_thirty_grams():
     assert mass == pytest.approx(0.030, rel=0.02)
 
 
-def test_an_unknown_scale_is_refused(tmp_path):
+@pytest.mark.parametrize("campaign", [cellulose_campaign, drum_campaign])
+def test_an_unknown_scale_is_refused(campaign, tmp_path):
     with pytest.raises(InputError, match="must be one of h200, bench"):
-        drum_campaign.run_study("paper", tmp_path)
+        campaign.run_study("paper", tmp_path)
 
 
 @pytest.mark.parametrize("study_app", [cellulose_app, wheat_app])

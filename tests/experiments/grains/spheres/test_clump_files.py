@@ -1,7 +1,5 @@
 """Clumps in the formats of other codes: the same grain, whatever the file."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

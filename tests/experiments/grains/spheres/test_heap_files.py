@@ -4,8 +4,6 @@ The files under ``data`` were written by LIGGGHTS-PUBLIC 3.8.0, LAMMPS and Yade 
 scripts there.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Heaps side by side: cut out of a photograph, and drawn at one scale."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The files of a discovery: the same numbers everywhere, and a study that loads with the mechanism in it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The page on a disagreement: well formed for every verdict, with the discovery's own numbers and words."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Words of the page next to the verdict: instruments that a model leans on, factors that drift."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
