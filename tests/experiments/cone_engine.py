@@ -5,12 +5,16 @@ import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from dem_warp import Case, CaseResult
+from experiments.cases import execute
+from experiments.cases.workers import own
+from experiments.measurement.case_observables import Observed
 from experiments.report.material_card import write_material_card
 from experiments.runs import calibration
 
@@ -38,6 +42,19 @@ def cone_engine(
         results.append(cone_of(math.tan(math.radians(angle)), observables={"truth": angle}))
         on_result(index, results[-1])
     return results
+
+
+def observe(_: object, result: CaseResult, leaves_a_heap: bool) -> Observed:
+    """Take the angle that a stand-in engine reports as the truth."""
+    heap = {"angle": result.observables["truth"]} if leaves_a_heap else {}
+    return Observed(result.observables | heap, SimpleNamespace(se=0.1) if heap else None)
+
+
+def stand_in(patch: pytest.MonkeyPatch, simulate: Any) -> None:
+    """Let another function simulate, and draw no heaps."""
+    patch.setattr(own, "simulate", simulate)
+    patch.setattr(execute, "observe", observe)
+    patch.setattr(calibration, "heap_pictures", lambda *_: [])
 
 
 def without_pages(patch: pytest.MonkeyPatch) -> None:

@@ -8,14 +8,13 @@ import pandas as pd
 import pytest
 
 from doe import Design, Factor
-from experiments.calibrate import calibrate, case_seed
+from experiments.calibrate import case_seed
 from experiments.calibrate.cases import plan_cases, response_table, too_many_failed
 from experiments.calibrate.climb_stage import _Line
 from experiments.calibrate.results import STAGES
 from experiments.calibrate.screening_stage import analyse_screening, screening_design
 from experiments.calibrate.surface_stage import fit_inside
 from experiments.calibrate.target_stage import plan_target
-from experiments.studyfile import load_study
 from experiments.studyfile.campaign import (
     TARGET_SCENE,
     CampaignSettings,
@@ -144,21 +143,6 @@ def test_a_design_is_fitted_into_its_limits(
     axial = Factor.around("x", *fitted).to_natural(np.array([-1.5, 1.5]))
     assert axial[0] >= low
     assert axial[1] <= high
-
-
-def test_the_buckwheat_study_runs_through_all_stages() -> None:
-    study = load_study(scale="bench")
-
-    def heaps(table: pd.DataFrame) -> pd.DataFrame:
-        coded = {f.name: f.to_coded(table[f.name]) for f in study.factors}
-        noise = [np.random.default_rng(seed).normal(0.0, 0.4) for seed in table["seed"]]
-        angle = 26.0 + 2.5 * coded["E"] + 7.0 * coded["F"] + noise
-        return table.assign(status="finished", reason="", angle=angle)
-
-    campaign = calibrate(study, heaps)
-    assert list(campaign.stages) == list(STAGES)
-    assert {"E", "F"} <= set(campaign.selection.kept)
-    assert (campaign.optimum.truth is None) == (study.target.twin is None)
 
 
 SPEED = "a grain passed the speed limit at {} s: lower time_step_fraction"

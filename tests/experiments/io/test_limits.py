@@ -174,14 +174,6 @@ def test_a_mesh_names_no_other_file(tmp_path: Path) -> None:
         read_mesh(path)
 
 
-def test_a_mesh_of_mixed_winding_is_turned_outward(tmp_path: Path) -> None:
-    path = tmp_path / "tetrahedron.off"
-    corners, faces = "0 0 0\n9 0 0\n0 9 0\n0 0 9\n", "3 0 1 2\n3 0 1 3\n3 0 2 3\n3 1 2 3\n"
-    path.write_text(f"OFF\n4 4 0\n{corners}{faces}", encoding="utf-8")
-    # a sixth of the cube on its edges [m3]
-    assert read_mesh(path).volume == pytest.approx(9.0e-3**3 / 6.0)
-
-
 def test_toml_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     for content in (b"a = \x00", "a = 1\u2028= 2\x0b".encode()):

@@ -1,13 +1,15 @@
 """The pages in headless Chromium: light and dark, wide and narrow, on paper, without a network."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pytest
+from analytic_heaps import AnalyticHeaps, study_with
 from axe_playwright_python.sync_playwright import Axe
 from cone_engine import resting
+from discoveries import made_discovery
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from doe.discrepancy import Settings, Verdict
@@ -60,9 +62,6 @@ def small_heap() -> SolidHeap:
 @pytest.fixture(scope="module")
 def files(
     tmp_path_factory: pytest.TempPathFactory,
-    changed: Callable[..., Study],
-    heaps: Callable,
-    discovered: Callable,
     terms,
     whole_study: Study,
     plotly: str,
@@ -72,14 +71,14 @@ def files(
         tmp_path_factory.mktemp("pages"),
         HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8)),
     )
-    study = changed(load_study(None, "bench"), selection={"keep": ("E", "F")})
-    found: Campaign = calibrate(study, heaps())
+    study = study_with(load_study(None, "bench"), selection={"keep": ("E", "F")})
+    found: Campaign = calibrate(study, AnalyticHeaps())
     monkeypatch = pytest.MonkeyPatch()
     monkeypatch.setattr(html, "get_plotlyjs", lambda: plotly)
     pages = {
         "calibration": render_page(found, study, [picture], {"device": "cpu"}, solid=small_heap()),
         "search": render_discovery(
-            discovered(Verdict.NAMED), whole_study, terms, Settings(), [picture], ["study-with.toml"],
+            made_discovery(Verdict.NAMED), whole_study, terms, Settings(), [picture], ["study-with.toml"],
             {"device": "cpu"}, solid=small_heap(),
         ),
     }  # fmt: skip

@@ -1,14 +1,16 @@
 """Every way in which a campaign can end, and every number of kept factors, in the report."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import pytest
+from analytic_heaps import AnalyticHeaps, study_with
+from page_reader import Page
 
 from experiments.calibrate import Outcome, calibrate
 from experiments.report import render_page
 from experiments.report.kit.numbers import prose
 from experiments.report.verdict import HEADLINES, verdict_sentence
-from experiments.studyfile import Study, load_study
+from experiments.studyfile import load_study
 
 
 def never_climbing(row: Mapping[str, float]) -> float:
@@ -50,14 +52,12 @@ ENDINGS = {
 
 
 @pytest.mark.parametrize("outcome", ENDINGS)
-def test_every_ending_is_a_clear_report(
-    outcome: Outcome, read_page: type, changed: Callable[..., Study], heaps: Callable
-) -> None:
+def test_every_ending_is_a_clear_report(outcome: Outcome) -> None:
     nature, decisions = ENDINGS[outcome]
-    study = changed(load_study(), **decisions)
-    campaign = calibrate(study, heaps(**nature))
+    study = study_with(load_study(), **decisions)
+    campaign = calibrate(study, AnalyticHeaps(**nature))
     assert campaign.outcome is outcome
-    page = read_page(render_page(campaign, study))
+    page = Page(render_page(campaign, study))
     assert page.mismatches == []
     reason = campaign.reason if campaign.verification is None else verdict_sentence(campaign)
     assert f"{HEADLINES[outcome]}. {prose(reason)}" in page.text
@@ -68,12 +68,10 @@ def test_every_ending_is_a_clear_report(
 
 
 @pytest.mark.parametrize("names", [("F",), ("E", "F", "G")])
-def test_one_and_three_kept_factors_have_their_charts(
-    names: tuple[str, ...], read_page: type, changed: Callable[..., Study], heaps: Callable
-) -> None:
-    study = changed(load_study(), selection={"keep": names})
-    campaign = calibrate(study, heaps(three_frictions))
-    page = read_page(render_page(campaign, study))
+def test_one_and_three_kept_factors_have_their_charts(names: tuple[str, ...]) -> None:
+    study = study_with(load_study(), selection={"keep": names})
+    campaign = calibrate(study, AnalyticHeaps(three_frictions))
+    page = Page(render_page(campaign, study))
     drawn = {name for name in page.charts if name.startswith(("contour", "surface"))}
     if len(names) == 1:
         assert drawn == {"surface-curve"}
@@ -81,12 +79,10 @@ def test_one_and_three_kept_factors_have_their_charts(
         assert drawn == {"surface-relief", "contour-E-F", "contour-E-G", "contour-F-G"}
 
 
-def test_a_twin_study_tells_the_truth(
-    read_page: type, changed: Callable[..., Study], heaps: Callable
-) -> None:
-    study = changed(load_study(None, "bench"), selection={"keep": ("E", "F")})
-    campaign = calibrate(study, heaps())
-    page = read_page(render_page(campaign, study))
+def test_a_twin_study_tells_the_truth() -> None:
+    study = study_with(load_study(None, "bench"), selection={"keep": ("E", "F")})
+    campaign = calibrate(study, AnalyticHeaps())
+    page = Page(render_page(campaign, study))
     truth = campaign.optimum.truth
     assert (truth.values["E"], truth.values["F"]) == (0.42, 0.34)
     said = "the method recovered it" if truth.compatible else "the method did not recover it"
@@ -99,13 +95,13 @@ def test_a_twin_study_tells_the_truth(
     assert (marker["x"], marker["y"]) == ([0.42], [0.34])
 
 
-def test_failed_runs_are_listed_with_their_reason(
-    read_page: type, changed: Callable[..., Study], heaps: Callable
-) -> None:
-    study = changed(load_study(), selection={"keep": ("E", "F")})
-    campaign = calibrate(study, heaps(fails=lambda row: row["stage"] == "screening" and row["run"] == 3))
+def test_failed_runs_are_listed_with_their_reason() -> None:
+    study = study_with(load_study(), selection={"keep": ("E", "F")})
+    campaign = calibrate(
+        study, AnalyticHeaps(fails=lambda row: row["stage"] == "screening" and row["run"] == 3)
+    )
     text = render_page(campaign, study)
     assert "a grain left &lt;the domain&gt; &amp; fell" in text
-    rows = read_page(text).rows("failed")
+    rows = Page(text).rows("failed")
     assert len(rows) == len(campaign.failed_cases) == 1
     assert [text for text, _ in rows[0]][-2:] == ["diverged", "a grain left <the domain> & fell"]

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from cone_engine import resting
+from page_reader import Page
 
 import dem_warp
 from dem_warp import CaseResult
@@ -61,9 +62,7 @@ def heap_of(angle: float) -> CaseResult:
     return resting(centers, [[0.0, 0.0, 0.0, radius]])
 
 
-def test_pictures_show_the_extremes_of_a_stage_with_their_flanks(
-    campaign: Campaign, study: Study, read_page: type
-) -> None:
+def test_pictures_show_the_extremes_of_a_stage_with_their_flanks(campaign: Campaign, study: Study) -> None:
     coarse = study.measurement.model_copy(update={"pixels": 200, "azimuths": 2})
     study = study.model_copy(update={"measurement": coarse})
     asked = []
@@ -76,7 +75,7 @@ def test_pictures_show_the_extremes_of_a_stage_with_their_flanks(
     climb = campaign.cases[campaign.cases["stage"] == "climb"].sort_values("angle")["case_key"]
     assert {climb.iloc[0], climb.iloc[-1]} <= set(asked)
     assert len(pictures) == len(asked) == 7
-    page = read_page(render_page(campaign, study, pictures[:1]))
+    page = Page(render_page(campaign, study, pictures[:1]))
     [source] = [link for link in page.links if link.startswith("data:image")]
     data = np.frombuffer(base64.b64decode(source.partition(",")[2]), np.uint8)
     assert cv2.imdecode(data, cv2.IMREAD_COLOR).shape == pictures[0].image.shape

@@ -2,6 +2,7 @@
 
 import pandas as pd
 import pytest
+from page_reader import Page
 
 from experiments.report.kit.html import flat
 from experiments.report.kit.markdown import markdown_table
@@ -43,10 +44,10 @@ def test_numbers_read_as_a_reader_expects(text: object, expected: object) -> Non
     assert text == expected
 
 
-def test_an_equation_is_typeset_with_signs_and_powers(read_page: type) -> None:
+def test_an_equation_is_typeset_with_signs_and_powers() -> None:
     text = equation({"intercept": -60.8, "E:F": 121.17, "E^2": -72.09}, digits=4)
     assert (
-        read_page(f"<p>{text}</p>").text.replace("\xa0", " ").replace("\u2009", " ")
+        Page(f"<p>{text}</p>").text.replace("\xa0", " ").replace("\u2009", " ")
         == "−60.80 + 121.2 E·F − 72.09 E2"
     )
     assert "<sup>2</sup>" in text

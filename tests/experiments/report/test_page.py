@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from analytic_heaps import study_with
+from page_reader import Page
 
 from experiments.calibrate import Campaign, Outcome
 from experiments.report import HeapPicture, render_page
@@ -25,12 +27,12 @@ def test_the_page_is_well_formed_and_its_contents_lead_somewhere(page) -> None:
 
 
 def test_the_page_needs_no_network(
-    campaign: Campaign, study: Study, read_page: type, plotly: str, monkeypatch: pytest.MonkeyPatch
+    campaign: Campaign, study: Study, plotly: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(html, "get_plotlyjs", lambda: plotly)
     picture = HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8))
     text = render_page(campaign, study, [picture])
-    assert all(link.startswith(("#", "data:")) for link in read_page(text).links)
+    assert all(link.startswith(("#", "data:")) for link in Page(text).links)
     assert "plotly.js v" in plotly
     assert "://" not in text.replace(plotly, "")
     assert text.count("plotly.js v") == plotly.count("plotly.js v")
@@ -114,10 +116,8 @@ def test_the_summary_says_what_was_found(campaign: Campaign, page) -> None:
         assert prose(decision.outcome) in page.text
 
 
-def test_only_the_papers_study_shows_the_papers_numbers(
-    campaign: Campaign, study: Study, page, read_page: type, changed: Callable[..., Study]
-) -> None:
-    other = read_page(render_page(campaign, changed(study, companion="")))
+def test_only_the_papers_study_shows_the_papers_numbers(campaign: Campaign, study: Study, page) -> None:
+    other = Page(render_page(campaign, study_with(study, companion="")))
     for shown, expected in ((page, True), (other, False)):
         assert ("paper" in shown.ids) is expected
         assert ("table-paper-climb" in shown.tables) is expected

@@ -3,11 +3,11 @@
 import html
 import re
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from analytic_heaps import AnalyticHeaps, study_with
 
 from experiments.calibrate import Campaign, calibrate
 from experiments.report.cautions import FEW_GRAINS, cautions
@@ -67,9 +67,9 @@ def test_cautions_come_before_the_values(page_text: str) -> None:
     assert places == sorted(places)
 
 
-def test_a_bench_campaign_is_cautioned(changed: Callable[..., Study], heaps: Callable) -> None:
-    study = changed(load_study(None, "bench"), selection={"keep": ("E", "F")})
-    text = caution_texts(calibrate(study, heaps()), study)
+def test_a_bench_campaign_is_cautioned() -> None:
+    study = study_with(load_study(None, "bench"), selection={"keep": ("E", "F")})
+    text = caution_texts(calibrate(study, AnalyticHeaps()), study)
     assert "The target was simulated, not measured." in text
     assert f"fewer than {FEW_GRAINS} grains" in text
     assert "The shear modulus was softened." in text

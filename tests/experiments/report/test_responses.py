@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from analytic_heaps import planes, study_with
+from page_reader import Page
 
 from experiments.calibrate import Campaign, calibrate
 from experiments.io.units import Quantity
@@ -27,8 +28,8 @@ def found(point: Study) -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def responses_page(found: Campaign, point: Study, read_page: type):
-    return read_page(render_page(found, point))
+def responses_page(found: Campaign, point: Study):
+    return Page(render_page(found, point))
 
 
 def test_the_page_says_what_each_response_buys_and_takes(found: Campaign, responses_page) -> None:

@@ -7,20 +7,18 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from commandline import dem_warp
-from cone_engine import SEEDS, cone_engine, without_pages
+from cone_engine import SEEDS, cone_engine, observe, without_pages
 
 from experiments.cases import execute
 from experiments.cases.engines import engines
 from experiments.cases.show import heap
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover import engine_simulator
-from experiments.measurement.case_observables import Observed
 from experiments.runs import bridging, calibration, one_heap, search
 
 LOADED = (bridging, calibration, one_heap, search)
@@ -126,9 +124,6 @@ class writes_counted:  # noqa: N801
 @pytest.fixture(scope="module")
 def _stand_ins(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Simulate and measure in no time, and write the results without a page."""
-
-    def observe(_: Any, result: Any, __: Any) -> Observed:
-        return Observed({"angle": result.observables["truth"]}, SimpleNamespace(se=0.1))
 
     def measure(_: Any, result: Any, names: tuple[str, ...]) -> tuple[np.ndarray, str]:
         return result.observables["truth"] + np.arange(len(names)), ""

@@ -6,25 +6,23 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from cone_engine import stand_in
 
 from dem_warp import Case, CaseResult
 from doe.discrepancy import Outcomes, bank_points, make_bank
 from experiments import api
 from experiments.calibrate import Campaign, Outcome
 from experiments.calibrate.stages import StageHook
-from experiments.cases import execute
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.store.outputs import LIST, sha256_of
 from experiments.cases.workers import own
 from experiments.discover.search import Search
 from experiments.io.errors import InputError
-from experiments.measurement.case_observables import Observed
 from experiments.runs import calibration as run
 from experiments.runs.choices import prepare
 from experiments.runs.request import RunRequest
@@ -58,13 +56,7 @@ class Engine:
 @pytest.fixture
 def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> Engine:
     engine = Engine(cone())
-    monkeypatch.setattr(own, "simulate", engine)
-    monkeypatch.setattr(
-        execute,
-        "observe",
-        lambda _, result, __: Observed({"angle": result.observables["truth"]}, SimpleNamespace(se=0.1)),
-    )
-    monkeypatch.setattr(run, "heap_pictures", lambda *_: [])
+    stand_in(monkeypatch, engine)
     return engine
 
 

@@ -5,19 +5,17 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 from commandline import dem_warp, refused
+from cone_engine import stand_in
 
 from dem_warp import CaseResult, Drum, Hopper
 from dem_warp.scenes.drum_surface import STATIONS
 from experiments.calibrate import Campaign, Outcome
-from experiments.cases import OwnWorkers, Store, execute, run_cases
-from experiments.cases.workers import own
-from experiments.measurement.case_observables import Observed
+from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.runs import calibration as run
 from experiments.runs.choices import measured_study, prepare
 from experiments.runs.request import RunRequest
@@ -92,19 +90,10 @@ class Engine:
             on_result(index, replace(self.heap, observables=seen))
 
 
-def observe(_: object, result: CaseResult, leaves_a_heap: bool) -> Observed:
-    """Take the angle that the stand-in engine reports."""
-    seen = result.observables
-    heap = {"angle": seen["truth"]} if leaves_a_heap else {}
-    return Observed(seen | heap, SimpleNamespace(se=0.1) if heap else None)
-
-
 @pytest.fixture
 def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> Engine:
     engine = Engine(cone())
-    monkeypatch.setattr(own, "simulate", engine)
-    monkeypatch.setattr(execute, "observe", observe)
-    monkeypatch.setattr(run, "heap_pictures", lambda *_: [])
+    stand_in(monkeypatch, engine)
     return engine
 
 

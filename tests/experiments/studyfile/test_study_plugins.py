@@ -67,19 +67,6 @@ def test_a_new_scene_has_its_section_with_units_bounds_and_rules(write_study: Wr
             load_study(write_study((TUBE, TILTED.replace('lean = "9 deg"', wrong))))
 
 
-def test_a_parameter_of_a_new_scene_can_be_a_factor(write_study: WriteStudy) -> None:
-    varied = (
-        'parameter = "contact.grain-grain.static_friction"\nlow = 0.2\nhigh = 0.6',
-        'parameter = "scene.tilted-hopper.lean"\nlow = "3 deg"\nhigh = "9 deg"',
-    )
-    friction = ("restitution = 0.2", "restitution = 0.2\nstatic_friction = 0.3")
-    study = load_study(write_study((TUBE, TILTED.replace('lean = "9 deg"\n', "")), varied, friction))
-    assert study.limits["E"][1] == pytest.approx(28.64788975654116, rel=1e-12)
-    assert study.case({"E": 5.0}, seed=1).scene.lean == pytest.approx(0.08726646259971647, rel=1e-15)
-    with pytest.raises(StudyError, match=r"tilted-hopper.lean: must be less than"):
-        study.case({"E": 30.0}, seed=1)
-
-
 @pytest.mark.parametrize("written", ['"2 mJ/m^2"', "0.002"])
 def test_a_new_mechanism_takes_its_units_and_plain_numbers(write_study: WriteStudy, written: str) -> None:
     study = load_study(write_study(add=f"\n[mechanism.sticky]\nstickiness = {written}\n"))

@@ -1,7 +1,6 @@
 """The files of a discovery: the same numbers everywhere, and a study that loads with the mechanism in it."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from discoveries import made_discovery
 
 from doe.discrepancy import Discovery, Interval, Settings, Verdict
 from experiments.calibrate.checks import check_calibration
@@ -20,8 +20,6 @@ from experiments.runs.choices import measured_study
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import BY_NAME, OBSERVABLES
-
-Discovered = Callable[[Verdict], Discovery]
 
 TRIAL = Path(__file__).parents[4] / "experiments" / "studies" / "trial" / "study.toml"
 
@@ -36,18 +34,16 @@ def trial_terms(trial: Study) -> Terms:
     return Terms.of(library_for(trial), OBSERVABLES, trial.factor_sections)
 
 
-def found_on(trial: Study, discovered: Discovered, verdict: Verdict) -> Discovery:
+def found_on(trial: Study, verdict: Verdict) -> Discovery:
     """Return a discovery with the factors of the trial study."""
-    found = discovered(verdict)
+    found = made_discovery(verdict)
     names = tuple(factor.name for factor in trial.factors)[:2]
     drifts = tuple(replace(drift, factor=name) for drift, name in zip(found.drifts, names, strict=False))
     return replace(found, factors=names, drifts=drifts)
 
 
-def test_the_files_hold_the_same_numbers(
-    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
-) -> None:
-    found = found_on(trial, discovered, Verdict.NAMED)
+def test_the_files_hold_the_same_numbers(trial: Study, trial_terms: Terms, tmp_path: Path) -> None:
+    found = found_on(trial, Verdict.NAMED)
     page = write_discovery(found, trial, trial_terms, Settings(), tmp_path, provenance={"device": "cpu"})
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
@@ -63,10 +59,10 @@ def test_the_files_hold_the_same_numbers(
 
 
 def test_the_study_with_the_mechanism_loads_and_can_be_calibrated(
-    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+    trial: Study, trial_terms: Terms, tmp_path: Path
 ) -> None:
     most = trial_terms.mechanisms["contact_adhesion"].maximum
-    found = found_on(trial, discovered, Verdict.NAMED)
+    found = found_on(trial, Verdict.NAMED)
     assert found.chosen is not None
     size = Interval(0.4 * most, 0.5 * most, 1.2 * most)
     found = replace(found, chosen=replace(found.chosen, sizes=(size,)))
@@ -86,9 +82,9 @@ def test_the_study_with_the_mechanism_loads_and_can_be_calibrated(
 
 
 def test_all_that_was_measured_is_to_be_matched_under_its_condition(
-    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+    trial: Study, trial_terms: Terms, tmp_path: Path
 ) -> None:
-    found = found_on(trial, discovered, Verdict.NAMED)
+    found = found_on(trial, Verdict.NAMED)
     write_discovery(found, trial, trial_terms, Settings(), tmp_path)
     study = load_study(tmp_path / "study-with-contact_adhesion.toml")
     data, responses = found.data, study.target.responses
@@ -116,9 +112,9 @@ def test_all_that_was_measured_is_to_be_matched_under_its_condition(
 
 
 def test_a_tilt_seen_from_behind_is_written_as_the_study_has_it(
-    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+    trial: Study, trial_terms: Terms, tmp_path: Path
 ) -> None:
-    found = found_on(trial, discovered, Verdict.NAMED)
+    found = found_on(trial, Verdict.NAMED)
     assert found.chosen is not None
     tilted = {"mechanisms": ("plate_tilt",), "sizes": (Interval(4.0, 5.0, 6.0),)}
     lean = found.data.observables.index("asymmetry")
@@ -137,10 +133,8 @@ def test_a_tilt_seen_from_behind_is_written_as_the_study_has_it(
         assert first.measured.se == pytest.approx(found.data.standard_errors[0, lean] / abs(share), rel=1e-5)
 
 
-def test_a_tie_gives_a_study_for_each(
-    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
-) -> None:
-    write_discovery(found_on(trial, discovered, Verdict.TIE), trial, trial_terms, Settings(), tmp_path)
+def test_a_tie_gives_a_study_for_each(trial: Study, trial_terms: Terms, tmp_path: Path) -> None:
+    write_discovery(found_on(trial, Verdict.TIE), trial, trial_terms, Settings(), tmp_path)
     names = sorted(path.name for path in tmp_path.glob("study-with-*.toml"))
     assert names == ["study-with-contact_adhesion.toml", "study-with-liquid_bridges.toml"]
     for name in names:
@@ -149,7 +143,7 @@ def test_a_tie_gives_a_study_for_each(
 
 @pytest.mark.parametrize("verdict", [Verdict.NONE, Verdict.UNKNOWN, Verdict.NOT_IDENTIFIABLE])
 def test_nothing_named_writes_no_study(
-    verdict: Verdict, trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+    verdict: Verdict, trial: Study, trial_terms: Terms, tmp_path: Path
 ) -> None:
-    write_discovery(found_on(trial, discovered, verdict), trial, trial_terms, Settings(), tmp_path)
+    write_discovery(found_on(trial, verdict), trial, trial_terms, Settings(), tmp_path)
     assert list(tmp_path.glob("*.toml")) == []

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from discoveries import made_discovery
+from page_reader import Page
 
 from doe.discrepancy import Answer, Discovery, Interval, Question, Settings, Slip, Verdict
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
@@ -18,15 +20,12 @@ from experiments.report.discovery.search_text import search_pastes
 from experiments.report.discovery.terms import percent
 from experiments.studyfile import Study
 
-Discovered = Callable[[Verdict], Discovery]
 Pages = Callable[[Verdict], Any]
 
 
 @pytest.mark.parametrize("verdict", Verdict)
-def test_every_verdict_has_a_page_that_is_whole(
-    verdict: Verdict, discovered: Discovered, discovery_page: Pages
-) -> None:
-    found, page = discovered(verdict), discovery_page(verdict)
+def test_every_verdict_has_a_page_that_is_whole(verdict: Verdict, discovery_page: Pages) -> None:
+    found, page = made_discovery(verdict), discovery_page(verdict)
     assert page.mismatches == []
     assert [name for name, count in Counter(page.ids).items() if count > 1] == []
     links = [link for link in page.links if not link.startswith("data:")]
@@ -38,10 +37,8 @@ def test_every_verdict_has_a_page_that_is_whole(
     assert found.effort.settings_sha256 in page.text
 
 
-def test_a_named_effect_is_told_with_its_size_and_what_it_removed(
-    discovered: Discovered, terms: Terms
-) -> None:
-    sentence = verdict_sentence(discovered(Verdict.NAMED), terms).replace("\u00a0", " ")
+def test_a_named_effect_is_told_with_its_size_and_what_it_removed(terms: Terms) -> None:
+    sentence = verdict_sentence(made_discovery(Verdict.NAMED), terms).replace("\u00a0", " ")
     assert sentence == (
         "Adding contact adhesion at 0.052 J/m² (90 % interval 0.041 to 0.064) removed 98 % (94 to 100 %) of"
         " the excess; held out, Q fell from 121 (98 to 143) to 11 (7.1 to 16). Do this next: Measure contact"
@@ -50,13 +47,13 @@ def test_a_named_effect_is_told_with_its_size_and_what_it_removed(
 
 
 def test_no_share_is_told_of_an_excess_that_is_not_there(
-    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type, discovery_page: Pages
+    whole_study: Study, terms: Terms, discovery_page: Pages
 ) -> None:
     # A gap may be found by the fall of Q that a mechanism brings, though Q itself is within its noise.
-    found = discovered(Verdict.TIE)
+    found = made_discovery(Verdict.TIE)
     assert found.base is not None
     quiet = replace(found, base=replace(found.base, q=found.base.degrees_of_freedom - 1.0))
-    quiet_page = read_page(render_discovery(quiet, whole_study, terms, Settings()))
+    quiet_page = Page(render_discovery(quiet, whole_study, terms, Settings()))
     for page, words in ((discovery_page(Verdict.TIE), True), (quiet_page, False)):
         assert ("explained-chart" in page.charts) is words
         assert (page.rows("candidates")[0][2][1] is not None) is words
@@ -78,10 +75,8 @@ def test_no_share_is_told_of_an_excess_that_is_not_there(
         ),
     ],
 )
-def test_a_gap_is_told_by_the_test_that_sees_it(
-    clearest: Answer, words: str, discovered: Discovered, terms: Terms
-) -> None:
-    found = discovered(Verdict.UNKNOWN)
+def test_a_gap_is_told_by_the_test_that_sees_it(clearest: Answer, words: str, terms: Terms) -> None:
+    found = made_discovery(Verdict.UNKNOWN)
     assert found.base is not None
     # Q itself lies within its limit, which must not be called beyond the noise.
     base = replace(found.base, q=43.8, q_limit=73.7, clearest=clearest)
@@ -89,8 +84,8 @@ def test_a_gap_is_told_by_the_test_that_sees_it(
     assert f"not by Q alone but in that {words}. " in unknown
 
 
-def test_what_would_withdraw_a_name_is_the_fit_that_gave_it(discovered: Discovered, terms: Terms) -> None:
-    found = discovered(Verdict.NAMED)
+def test_what_would_withdraw_a_name_is_the_fit_that_gave_it(terms: Terms) -> None:
+    found = made_discovery(Verdict.NAMED)
     assert found.chosen is not None
     likely = replace(found, chosen=replace(found.chosen, p_value=0.31))
     words = changes(likely, terms, Settings(fit_level=0.1))
@@ -98,41 +93,41 @@ def test_what_would_withdraw_a_name_is_the_fit_that_gave_it(discovered: Discover
     assert any(wanted in sentence for sentence in words)
 
 
-def test_the_page_shows_every_mechanism_and_the_first_pairs(discovered: Discovered) -> None:
-    found = discovered(Verdict.UNKNOWN)
+def test_the_page_shows_every_mechanism_and_the_first_pairs() -> None:
+    found = made_discovery(Verdict.UNKNOWN)
     single = found.candidates[0]
     pairs = [replace(single, mechanisms=("plate_tilt", f"other_{number}")) for number in range(9)]
     several = replace(found, candidates=(*found.candidates, *pairs))
     assert shown_candidates(several) == [*found.candidates, *pairs[:SHOWN_PAIRS]]
 
 
-def test_only_what_was_measured_stands_in_the_table_of_data(discovered: Discovered, terms: Terms) -> None:
-    table = data_table(discovered(Verdict.NOT_IDENTIFIABLE), terms)
+def test_only_what_was_measured_stands_in_the_table_of_data(terms: Terms) -> None:
+    table = data_table(made_discovery(Verdict.NOT_IDENTIFIABLE), terms)
     assert [column.key for column in table.columns] == ["observable", "base"]
     assert [row.cells[0].text for row in table.rows] == ["flank angle [°]", "heaps"]
 
 
-def test_a_rise_of_the_held_out_gap_is_not_called_a_fall(discovered: Discovered, terms: Terms) -> None:
-    found = discovered(Verdict.NAMED)
+def test_a_rise_of_the_held_out_gap_is_not_called_a_fall(terms: Terms) -> None:
+    found = made_discovery(Verdict.NAMED)
     training, held_out = found.before_after
     turned = replace(held_out, before=held_out.after, after=held_out.before)
     assert "Q rose from 11" in verdict_sentence(replace(found, before_after=(training, turned)), terms)
 
 
-def test_the_other_verdicts_name_nothing_as_missing(discovered: Discovered, terms: Terms) -> None:
+def test_the_other_verdicts_name_nothing_as_missing(terms: Terms) -> None:
     none, unknown, tie, unclear = (
-        verdict_sentence(discovered(verdict), terms)
+        verdict_sentence(made_discovery(verdict), terms)
         for verdict in (Verdict.NONE, Verdict.UNKNOWN, Verdict.TIE, Verdict.NOT_IDENTIFIABLE)
     )
     assert "agrees with the data" in none
     assert "comes closest" in unknown
     assert "contact adhesion at 0.052" in tie
     assert "liquid bridges at 0.034" in tie
-    assert unclear == discovered(Verdict.NOT_IDENTIFIABLE).reason
+    assert unclear == made_discovery(Verdict.NOT_IDENTIFIABLE).reason
 
 
-def test_the_maps_show_the_residuals_of_both_models(discovered: Discovered, discovery_page: Pages) -> None:
-    found, page = discovered(Verdict.NAMED), discovery_page(Verdict.NAMED)
+def test_the_maps_show_the_residuals_of_both_models(discovery_page: Pages) -> None:
+    found, page = made_discovery(Verdict.NAMED), discovery_page(Verdict.NAMED)
     assert found.base is not None
     assert found.chosen is not None
     for name, fit in (("residuals-before", found.base), ("residuals-after", found.chosen)):
@@ -145,8 +140,8 @@ def test_the_maps_show_the_residuals_of_both_models(discovered: Discovered, disc
         assert sum("*" in t for row in drawn["text"] for t in row) == int((fit.adjusted_p < 0.05).sum())
 
 
-def test_only_what_was_measured_is_compared(discovered: Discovered, discovery_page: Pages) -> None:
-    found, page = discovered(Verdict.NAMED), discovery_page(Verdict.NAMED)
+def test_only_what_was_measured_is_compared(discovery_page: Pages) -> None:
+    found, page = made_discovery(Verdict.NAMED), discovery_page(Verdict.NAMED)
     drawn = {name: chart for name, chart in page.charts.items() if name.startswith("compared-")}
     assert len(drawn) == len(found.data.observables)
     for name, chart in drawn.items():
@@ -157,10 +152,8 @@ def test_only_what_was_measured_is_compared(discovered: Discovered, discovery_pa
         assert len(chart["layout"]["xaxis"]["ticktext"]) == measured
 
 
-def test_candidates_stand_in_their_order_with_their_judgement(
-    discovered: Discovered, discovery_page: Pages, terms: Terms
-) -> None:
-    found = discovered(Verdict.NAMED)
+def test_candidates_stand_in_their_order_with_their_judgement(discovery_page: Pages, terms: Terms) -> None:
+    found = made_discovery(Verdict.NAMED)
     rows = discovery_page(Verdict.NAMED).rows("candidates")
     for row, candidate in zip(rows, found.candidates, strict=True):
         assert row[1][0] == terms.titles(candidate.mechanisms)
@@ -168,23 +161,19 @@ def test_candidates_stand_in_their_order_with_their_judgement(
         assert row[-1][0] == ("admitted" if candidate.admitted else candidate.objection)
 
 
-def test_a_search_has_a_paragraph_and_a_table_to_paste(
-    discovered: Discovered, whole_study: Study, terms: Terms
-) -> None:
-    found = discovered(Verdict.NAMED)
+def test_a_search_has_a_paragraph_and_a_table_to_paste(whole_study: Study, terms: Terms) -> None:
+    found = made_discovery(Verdict.NAMED)
     by_name = {paste.name: paste.text for paste in search_pastes(found, whole_study, terms, {})}
     text = by_name["methods-markdown"]
     assert "fitted to 48 means of 12 observables under 4 conditions; 1 further condition was held out" in text
     assert f"{found.effort.bank_cases + found.effort.fresh_cases} cases were simulated." in text
     assert verdict_sentence(found, terms) in text
     assert by_name["table-latex"].isascii()
-    assert search_pastes(discovered(Verdict.NOT_IDENTIFIABLE), whole_study, terms, {}) == []
+    assert search_pastes(made_discovery(Verdict.NOT_IDENTIFIABLE), whole_study, terms, {}) == []
 
 
-def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(
-    discovered: Discovered, terms: Terms
-) -> None:
-    found = discovered(Verdict.TIE)
+def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(terms: Terms) -> None:
+    found = made_discovery(Verdict.TIE)
     assert found.next_experiment is not None
     words = " ".join(changes(found, terms, Settings()))
     assert "8 more tests under the condition “wide” would settle it" in words
@@ -197,10 +186,8 @@ def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(
         assert terms.mechanisms[name].confirm in words
 
 
-def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(
-    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
-) -> None:
-    none, tie, named = (discovered(v) for v in (Verdict.NONE, Verdict.TIE, Verdict.NAMED))
+def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(whole_study: Study, terms: Terms) -> None:
+    none, tie, named = (made_discovery(v) for v in (Verdict.NONE, Verdict.TIE, Verdict.NAMED))
     value = Slip(("height",), ("rough",), 5, 3.0, False, 361.0, 0.0)
     noted = replace(named, slips=(value,), without_slips=named)
     assert headline(noted, terms) == headline(named, terms)
@@ -214,11 +201,11 @@ def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(
     words = verdict_sentence(heads, terms)
     assert "With them: tie: contact adhesion and liquid bridges." in words
     assert words.endswith(verdict_sentence(none, terms))
-    page = read_page(render_discovery(heads, whole_study, terms, Settings()))
+    page = Page(render_discovery(heads, whole_study, terms, Settings()))
     assert next_step(heads, terms).startswith("Look at the data first")
     assert next_step(heads, terms) in page.text
     # what is missed may be that value
-    unknown = discovered(Verdict.UNKNOWN)
+    unknown = made_discovery(Verdict.UNKNOWN)
     noted_unknown = replace(unknown, slips=(value,), without_slips=unknown, next_experiment=None)
     assert headline(noted_unknown, terms) == headline(unknown, terms)
     assert next_step(noted_unknown, terms).startswith("Look at the data first")
@@ -229,8 +216,8 @@ def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(
     assert "r50 and fill height look as if multiplied by 10" in verdict_sentence(gross, terms)
 
 
-def test_a_heap_that_is_none_of_the_others_is_told_once(discovered: Discovered, terms: Terms) -> None:
-    none = discovered(Verdict.NONE)
+def test_a_heap_that_is_none_of_the_others_is_told_once(terms: Terms) -> None:
+    none = made_discovery(Verdict.NONE)
     heap = Slip(none.data.observables, ("wide",), 3, None, False, 254.0, 0.0)
     [words] = slip_sentences(replace(none, slips=(heap,), without_slips=none))
     assert words.startswith(
@@ -257,15 +244,15 @@ def off_alike(found: Discovery, deviations: float) -> Discovery:
 
 
 def test_an_unknown_that_is_off_alike_everywhere_names_the_observable_and_the_next_measurement(
-    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+    whole_study: Study, terms: Terms
 ) -> None:
-    found = off_alike(discovered(Verdict.UNKNOWN), 1.4)
+    found = off_alike(made_discovery(Verdict.UNKNOWN), 1.4)
     # 1.4 of 0.01 s; of five such residuals the mean is off by 1.4 root 5 of its standard errors
     assert misses(found, terms) == [
         "t55 is 0.014 s late in all conditions (3.1 standard errors of the mean)."
     ]
     assert conventions(found, terms)[0].startswith("For t55: a start of the clock")
-    page = read_page(render_discovery(found, whole_study, terms, Settings()))
+    page = Page(render_discovery(found, whole_study, terms, Settings()))
     assert "T55 is 0.014 s late in all conditions" in page.text
     assert "Measure t55 of a few more heaps" in page.text
     # a model that passes every rule, though another does, too, misses nothing
@@ -275,10 +262,8 @@ def test_an_unknown_that_is_off_alike_everywhere_names_the_observable_and_the_ne
     assert len(misses(off_alike(found, 0.2), terms)) == 1
 
 
-def test_the_summary_says_an_objection_once(
-    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
-) -> None:
-    found = discovered(Verdict.UNKNOWN)
+def test_the_summary_says_an_objection_once(whole_study: Study, terms: Terms) -> None:
+    found = made_discovery(Verdict.UNKNOWN)
     objection = found.candidates[0].objection
     words = replace(found, reason=f"contact adhesion comes closest, but {objection}")
     text = render_discovery(words, whole_study, terms, Settings())
@@ -287,10 +272,8 @@ def test_the_summary_says_an_objection_once(
     assert not any("Contact adhesion was refused" in one for one in changes(words, terms, Settings()))
 
 
-def test_models_of_two_effects_have_their_titles_in_the_next_experiment(
-    discovered: Discovered, terms: Terms
-) -> None:
-    found = discovered(Verdict.NAMED)
+def test_models_of_two_effects_have_their_titles_in_the_next_experiment(terms: Terms) -> None:
+    found = made_discovery(Verdict.NAMED)
     assert found.next_experiment is not None
     step = replace(found.next_experiment, separates=("plate_tilt + size_spread", "plate_tilt"))
     words = next_step(replace(found, next_experiment=step), terms)
@@ -303,10 +286,8 @@ def test_models_of_two_effects_have_their_titles_in_the_next_experiment(
     assert "Repeat the test" not in weak
 
 
-def test_a_mean_that_stands_out_of_a_model_that_lacks_nothing_is_told(
-    discovered: Discovered, terms: Terms
-) -> None:
-    found = discovered(Verdict.NONE)
+def test_a_mean_that_stands_out_of_a_model_that_lacks_nothing_is_told(terms: Terms) -> None:
+    found = made_discovery(Verdict.NONE)
     assert found.base is not None
     assert "By itself" not in verdict_sentence(found, terms)
     residuals, p = found.base.residuals.copy(), found.base.adjusted_p.copy()
@@ -319,13 +300,13 @@ def test_a_mean_that_stands_out_of_a_model_that_lacks_nothing_is_told(
     assert "under wide (4 standard deviations)" in words
 
 
-def test_notes_are_told_in_words(discovered: Discovered, whole_study: Study, terms: Terms) -> None:
+def test_notes_are_told_in_words(whole_study: Study, terms: Terms) -> None:
     notes = (
         "readings of flank_angle scatter 2.0 times as much",
         "plate_tilt is not in the bank",
         "out/my_run",
     )
-    found = replace(discovered(Verdict.NONE), notes=notes)
+    found = replace(made_discovery(Verdict.NONE), notes=notes)
     text = render_discovery(found, whole_study, terms, Settings())
     assert "readings of flank angle scatter 2.0 times as much." in text
     assert f"{terms.title('plate_tilt')} is not in the bank." in text

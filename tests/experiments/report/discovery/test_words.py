@@ -1,14 +1,12 @@
 """Words of the page next to the verdict: instruments that a model leans on, factors that drift."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from discoveries import made_discovery
 
-from doe.discrepancy import CalibrationUse, Discovery, Fit, Verdict
+from doe.discrepancy import CalibrationUse, Fit, Verdict
 from experiments.report.discovery import Terms, verdict_sentence
-
-Discovered = Callable[[Verdict], Discovery]
 
 
 def leaning_on(fit: Fit | None, **deviations: float) -> Fit:
@@ -19,10 +17,8 @@ def leaning_on(fit: Fit | None, **deviations: float) -> Fit:
 
 
 @pytest.mark.parametrize("verdict", [Verdict.NONE, Verdict.NAMED, Verdict.UNKNOWN])
-def test_a_model_that_leans_on_an_allowance_says_so(
-    verdict: Verdict, discovered: Discovered, terms: Terms
-) -> None:
-    found = discovered(verdict)
+def test_a_model_that_leans_on_an_allowance_says_so(verdict: Verdict, terms: Terms) -> None:
+    found = made_discovery(verdict)
     part = {Verdict.NONE: "base", Verdict.NAMED: "chosen", Verdict.UNKNOWN: "closest"}[verdict]
     fit = leaning_on(found.base, t55=2.6, fill_height=1.9)
     sentence = verdict_sentence(replace(found, **{part: fit}), terms)
@@ -32,8 +28,8 @@ def test_a_model_that_leans_on_an_allowance_says_so(
     assert "fill height (" not in sentence
 
 
-def test_lengths_that_lean_on_one_scale_are_one_instrument(discovered: Discovered, terms: Terms) -> None:
-    found = discovered(Verdict.NAMED)
+def test_lengths_that_lean_on_one_scale_are_one_instrument(terms: Terms) -> None:
+    found = made_discovery(Verdict.NAMED)
     assert found.chosen is not None
     # off by 0.5 % of 0.2 % allowed, all lengths of the picture alike
     uses = [CalibrationUse(name, 0.0, 0.002, 0.0, 0.005, 2.5) for name in ("height", "r50", "r90")]
@@ -42,10 +38,8 @@ def test_lengths_that_lean_on_one_scale_are_one_instrument(discovered: Discovere
     assert sentence.endswith(words)
 
 
-def test_factors_that_drift_are_no_contradiction_to_a_model_that_lacks_nothing(
-    discovered: Discovered, terms: Terms
-) -> None:
-    found = discovered(Verdict.NONE)
+def test_factors_that_drift_are_no_contradiction_to_a_model_that_lacks_nothing(terms: Terms) -> None:
+    found = made_discovery(Verdict.NONE)
     first, second = found.drifts
     words = "would differ between conditions"
     assert f"{terms.factors[first.factor].label} and" in verdict_sentence(found, terms)
