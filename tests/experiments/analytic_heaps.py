@@ -72,7 +72,7 @@ def planes(study: Study, table: pd.DataFrame) -> pd.DataFrame:
 
 @dataclass(frozen=True)
 class StandInStudy:
-    """What a campaign asks a study for."""
+    """The part of a study that a campaign asks for."""
 
     target: Target
     factors: tuple[Factor, ...]

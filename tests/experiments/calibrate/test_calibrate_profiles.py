@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from small_study import ANGLE
 
 from experiments.calibrate import Campaign, Outcome, calibrate
 from experiments.measurement.profile_responses import with_profiles
@@ -13,7 +14,6 @@ from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import OUTLINE
 from imaging.flank.heap_shape import STATIONS, profile_heights
 
-ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 ROLLING = """
 [[factor]]
 name = "G"

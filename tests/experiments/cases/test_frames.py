@@ -12,6 +12,7 @@ import pyvista
 from commandline import dem_warp
 from PIL import Image
 from scipy.spatial.transform import Rotation
+from small_study import ANGLE, TUBE
 
 from dem_warp import CaseResult
 from experiments.cases import Heap, write_heap
@@ -156,13 +157,20 @@ def test_the_clean_picture_measures_to_the_same_angle(
         assert (drawn != bare).any(axis=2).mean() > 0.001
 
 
-def test_a_film_of_another_test(write_study: Callable[..., Path], tmp_path: Path) -> None:
+def test_another_test_is_filmed_and_gives_what_it_measures(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
     hopper = '[scene.hopper]\ndiameter = "40 mm"\nfill_depth = "16 mm"\noutlet = "20 mm"\n'
-    tube = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
-    study = write_study((tube, hopper), ('[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', ""))
-    out = tmp_path / "out"
-    code, _, err = dem_warp("heap", study, "--device", "cpu", "--frames", 2, "--movie", "mp4", "--out", out)
-    assert code == 0, err
+    study, out = write_study((TUBE, hopper), (ANGLE, "")), tmp_path / "out"
+    words = ("heap", study, "--device", "cpu", "--frames", 2, "--movie", "mp4", "--out", out)
+    code, said, err = dem_warp(*words)
+    assert (code, err.splitlines()[-1]) == (0, f"Files: {out}")
+    printed = dict(line.split(": ") for line in said.splitlines())
+    kept = json.loads((out / "angle.json").read_text(encoding="utf-8"))
+    assert kept["angle"] is None
+    assert printed["fallen mass"] == f"{kept['observables']['fallen_mass']:.5g} kg"
+    assert kept["observable_units"]["fallen_mass"] == "kg"
+    assert (out / "snapshot.png").is_file()
     names = {"spheres", "grains", "contacts", "bin", "floor", "plug"}
     assert {path.stem for path in (out / "frames").glob("*.pvd")} == names
     film = cv2.VideoCapture(str(out / "heap.mp4"))

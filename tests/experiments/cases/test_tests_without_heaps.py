@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from small_study import ANGLE, TUBE
 
 from dem_warp import Drum, Interaction, WallPart
 from doe.discrepancy import Point
@@ -22,8 +23,6 @@ from experiments.studyfile import Study, load_study
 
 WriteStudy = Callable[..., Path]
 
-TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
-ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 DRUM = """[scene.drum]
 diameter = "32 mm"
 length = "12 mm"

@@ -42,32 +42,6 @@ def test_every_command_explains_itself_with_an_example(command: str) -> None:
     assert f"Example: dem-warp {command}" in " ".join(out.split())
 
 
-HOPPER = """[scene.hopper]
-diameter = "28 mm"
-fill_depth = "16 mm"
-outlet = "20 mm"
-"""
-
-
-def of_a_hopper(write_study: WriteStudy) -> Path:
-    """Write a study of a hopper, whose target is no angle."""
-    angle = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
-    tube = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
-    return write_study((tube, HOPPER), (angle, ""))
-
-
-def test_another_test_than_a_heap_gives_what_it_measures(write_study: WriteStudy) -> None:
-    code, out, err = dem_warp("heap", of_a_hopper(write_study), "--device", "cpu", "--out", "results")
-    assert (code, err.splitlines()[-1]) == (0, "Files: results")
-    printed = dict(line.split(": ") for line in out.splitlines())
-    kept = json.loads(Path("results/angle.json").read_text(encoding="utf-8"))
-    assert kept["angle"] is None
-    fallen = kept["observables"]["fallen_mass"]
-    assert printed["fallen mass"] == f"{fallen:.5g} kg"
-    assert kept["observable_units"]["fallen_mass"] == "kg"
-    assert Path("results/snapshot.png").is_file()
-
-
 def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt

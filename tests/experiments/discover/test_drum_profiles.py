@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_study import ANGLE, TUBE
 
 from dem_warp.scenes.drum_surface import STATIONS
 from doe.discrepancy import Outcomes, Point, Verdict, drive, load_bank
@@ -14,8 +15,6 @@ from experiments.measurement.measured_file import read_measured
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import SURFACE
 
-TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
-ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 DRUM = '[scene.drum]\ndiameter = "60 mm"\nlength = "20 mm"\nrotation_rate = "15 1/min"\n'
 CONDITIONS = """
 [condition.slow]

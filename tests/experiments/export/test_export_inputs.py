@@ -13,19 +13,9 @@ from typing import get_args
 import numpy as np
 import pytest
 from commandline import dem_warp, refused
+from exported_lift import COUNT, GRAIN, exported_lift
 
-from dem_warp import (
-    PRESETS,
-    Case,
-    ClumpShape,
-    ContactLaws,
-    GrainPopulation,
-    Interaction,
-    LiftedCylinder,
-    Material,
-    Numerics,
-    ShapeMixture,
-)
+from dem_warp import PRESETS, ClumpShape, ContactLaws, ShapeMixture
 from dem_warp.laws.conventions import Rolling
 from dem_warp.laws.twisting import Twisting
 from dem_warp.population import SIZE_VARIANCE
@@ -36,11 +26,8 @@ from experiments.export.sizes import size_classes
 from experiments.io.errors import InputError
 from experiments.studyfile import load_study
 
-GRAIN = Material(density=1000.0, shear_modulus=3e5, poisson_ratio=0.25)
-WALL = Material(density=7800.0, shear_modulus=7e10, poisson_ratio=0.3)
 SPHERE = ClumpShape.sphere(1e-3)
 ROD = ClumpShape.from_spheres([[-1e-3, 0, 0], [0, 0, 0], [1e-3, 0, 0]], [1e-3] * 3)
-COUNT = 30
 PROGRAMS = {"liggghts": "liggghts", "lammps": "lmp"}
 """Codes with an input in their own language, and their programs."""
 
@@ -50,13 +37,7 @@ with_programs = pytest.mark.parametrize(
 
 
 def exported(laws: str, shape: ClumpShape | ShapeMixture = ROD, **changes: object) -> ExportedTest:
-    scene = LiftedCylinder(diameter=0.014, height=0.02, wall_material=WALL, rest_speed=3e-3)
-    scene = replace(scene, **({"grain_count": COUNT} | changes))
-    case = Case(
-        scene, GrainPopulation(shape, GRAIN), Interaction(0.5, 0.5, 0.1), Interaction(0.6, 0.4, 0.2),
-        seed=3, numerics=Numerics(modulus_scale=4.0), laws=PRESETS[laws],
-    )  # fmt: skip
-    return ExportedTest("small", case, "a test")
+    return exported_lift(laws, shape, **changes)
 
 
 def test_classes_of_size_have_the_populations_moments() -> None:

@@ -6,22 +6,13 @@ import json
 import math
 import re
 import subprocess
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from exported_lift import GRAIN, exported_lift
 
-from dem_warp import (
-    PRESETS,
-    Case,
-    ClumpShape,
-    GrainPopulation,
-    Interaction,
-    LiftedCylinder,
-    Material,
-    Numerics,
-)
+from dem_warp import Case, ClumpShape
 from experiments.export import (
     EXPORTERS,
     ExportedTest,
@@ -34,8 +25,6 @@ from experiments.export import (
 from experiments.export.deme_exporter import obj_text, thick_tube
 from experiments.export.same_rain import template
 
-GRAIN = Material(density=1000.0, shear_modulus=3e5, poisson_ratio=0.25)
-WALL = Material(density=7800.0, shear_modulus=7e10, poisson_ratio=0.3)
 CLUMP = ClumpShape.from_spheres([[-6e-4, 0.0, 0.0], [7e-4, 1e-4, 0.0], [0.0, 4e-4, 3e-4]], [1e-3, 8e-4, 7e-4])
 PROGRAMS = {"yade": "yade", "deme": "deme"}
 """Codes driven by Python, and the laws that they have."""
@@ -43,17 +32,7 @@ PROGRAMS = {"yade": "yade", "deme": "deme"}
 
 def exported(laws: str, **changes: Any) -> ExportedTest:
     """Return a small lifted cylinder in the laws of a code."""
-    scene = LiftedCylinder(diameter=0.02, height=0.03, wall_material=WALL, grain_count=40)
-    case = Case(
-        scene=replace(scene, **changes),
-        grains=GrainPopulation(CLUMP, GRAIN),
-        grain_grain=Interaction(0.5, 0.4, 0.1),
-        grain_wall=Interaction(0.6, 0.3, 0.2),
-        seed=7,
-        numerics=Numerics(modulus_scale=4.0),
-        laws=PRESETS[laws],
-    )
-    return ExportedTest("small", case, "a test")
+    return exported_lift(laws, CLUMP, **{"diameter": 0.02, "height": 0.03, "grain_count": 40} | changes)
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_study import ANGLE, TUBE
 
 from experiments.io.errors import InputError, StudyError
 from experiments.measurement.measured_target import with_measurements
@@ -12,8 +13,6 @@ from experiments.measurement.profile_files import read_drum_profiles
 from experiments.measurement.profile_responses import with_profiles
 from experiments.studyfile import load_study
 
-TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
-ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 DRUM = '[scene.drum]\ndiameter = "60 mm"\nlength = "20 mm"\nrotation_rate = "30 1/min"\n'
 TARGET = '[target]\nobservable = "surface"\nprofiles = "p.csv"\n'
 LINE = "".join(f"1,{x} mm,{-0.5 * x} mm\n" for x in range(-20, 21, 5))

@@ -9,14 +9,13 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 from commandline import dem_warp
+from small_study import ANGLE, TUBE
 
 from dem_warp import Drum, Material
 from experiments.measurement.filling import filling_missed, filling_reached, filling_text
 from experiments.report.cautions import _filling
 from experiments.studyfile import load_study
 
-TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
-ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 SCENE = """[scene.drum]
 diameter = "32 mm"
 length = "12 mm"

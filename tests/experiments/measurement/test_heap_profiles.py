@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from drawn_heaps import Camera, DrawnHeap, draw
+from small_study import ANGLE
 
 from dem_warp import CaseResult
 from experiments.io.errors import InputError
@@ -24,7 +25,6 @@ from imaging.flank.heap_shape import SPACING, STATIONS, profile_heights
 SIZE = ValueLimits(grain=1e-4, length=0.14, time=np.inf)
 SETTINGS = MeasurementSection(azimuths=4, pixels=400, outline=True)
 NAMES = [each.name for each in OUTLINE]
-ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 TARGET = '[target]\nobservable = "outline"\nprofiles = "p.csv"\n'
 Cone = Callable[..., CaseResult]
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn_heaps import Camera, DrawnHeap, draw
+from small_study import CONDITIONS
 from typer.testing import CliRunner
 
 from doe.discrepancy import Measured
@@ -18,17 +19,6 @@ from experiments.measurement.readings import CLOGGED
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import NAMES
 from imaging import save_picture
-
-CONDITIONS = """
-[condition.base]
-
-[condition.fast]
-scene.lifted-cylinder.lift_speed = "0.25 m/s"
-
-[condition.wide]
-held_out = true
-scene.lifted-cylinder.diameter = "40 mm"
-"""
 
 HEADER = "condition,replicate,observable,value,unit,picture,pixel\n"
 

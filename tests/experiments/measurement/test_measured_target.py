@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn_heaps import Camera, DrawnHeap, draw
+from small_study import CONDITIONS
 
 from doe import Sample
 from experiments.io.errors import InputError
@@ -18,17 +19,6 @@ from imaging import measure_photograph, save_picture
 WriteStudy = Callable[..., Path]
 
 NUMBERS = 'mean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
-
-CONDITIONS = """
-[condition.base]
-
-[condition.fast]
-scene.lifted-cylinder.lift_speed = "0.25 m/s"
-
-[condition.wide]
-held_out = true
-scene.lifted-cylinder.diameter = "40 mm"
-"""
 
 MEASURED = """condition,replicate,observable,value,unit
 base,1,angle,24.5,deg

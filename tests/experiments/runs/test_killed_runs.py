@@ -110,8 +110,8 @@ class writes_counted:  # noqa: N801
 
     def counted(self, write: Callable[..., Any]) -> Callable[..., Any]:
         def counting(*arguments: Any, **rest: Any) -> Any:
-            # how often the progress is noted depends on the clock
-            if Path(str(arguments[1])).name != "progress.json":
+            # whether progress and speeds are noted depends on the clock
+            if Path(str(arguments[1])).name not in ("progress.json", "batches.json"):
                 self.number += 1
                 if self.number == self.kill_at:
                     self.count.write_text(str(self.number))

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from commandline import dem_warp, refused
 from cone_engine import stand_in
+from small_study import ANGLE, TUBE
 
 from dem_warp import CaseResult, Drum, Hopper
 from dem_warp.scenes.drum_surface import STATIONS
@@ -102,10 +103,7 @@ def calibrated(study: Study, folder: Path) -> Campaign:
     return run.run_calibration(prepared).campaign
 
 
-NO_HEAP = (
-    ('[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n', ""),
-    ('[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', ""),
-)
+NO_HEAP = ((TUBE, ""), (ANGLE, ""))
 DRUM = """
 [scene.drum]
 diameter = "60 mm"

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 from commandline import refused
+from small_study import ANGLE, TUBE
 
 SMALL_STUDY = (Path(__file__).parents[1] / "small.toml").read_text(encoding="utf-8")
-TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
 HOPPER = '[scene.hopper]\ndiameter = "28 mm"\nfill_depth = "16 mm"\noutlet = "20 mm"\n'
-ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 HEAPS = Path(__file__).parents[1] / "grains" / "spheres" / "data"
 LONGEST_MESSAGE = 2500
 """Characters: a message is read, whatever came in."""

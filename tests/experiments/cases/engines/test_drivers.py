@@ -149,9 +149,3 @@ def test_the_same_seed_is_the_same_heap_and_another_is_another(write_study: Writ
     first, again, other = (simulate_heap(study, {}, seed).result for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.sphere_centers, again.sphere_centers)
     assert first.sphere_centers.tolist() != other.sphere_centers.tolist()
-
-
-def test_every_driver_has_an_exporter_whose_laws_are_a_known_set() -> None:
-    for name in ("liggghts", "lammps", "yade"):
-        assert name in EXPORTERS
-        assert name in PRESETS

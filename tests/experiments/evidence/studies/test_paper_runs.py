@@ -8,12 +8,7 @@ import pandas as pd
 import pytest
 
 from experiments.evidence.studies.buckwheat.replay.replay import ALL, Replay, published_noise
-from experiments.evidence.studies.buckwheat.replay.runs import (
-    OPTIMUM,
-    STAGES,
-    planned_cases,
-    published_runs,
-)
+from experiments.evidence.studies.buckwheat.replay.runs import OPTIMUM, STAGES, planned_cases, published_runs
 from experiments.studies.buckwheat import paper
 from experiments.studyfile import load_study
 
