@@ -10,7 +10,6 @@ from dem_warp import (
     RELATIVE,
     GrainPopulation,
     Interaction,
-    LiftedCylinder,
     Numerics,
     ShapeMixture,
     SizeClasses,
@@ -18,21 +17,6 @@ from dem_warp import (
     rayleigh_time,
 )
 from dem_warp.laws.linear_cohesion import LinearCohesion
-
-
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: LiftedCylinder(-0.03, 0.1, STEEL), r"LiftedCylinder.diameter: must be positive.* got -0.03"),
-        (lambda: GrainPopulation(PYRAMID, GRAIN, size_mean=0.0), r"size_mean: must be positive, got 0.0"),
-        (lambda: GrainPopulation(PYRAMID, GRAIN, size_sd=0.4), r"size_sd: .* below size_mean / 3, got 0.4"),
-        (lambda: Numerics(precision="half"), r"precision: must be one of mixed, double, got 'half'"),
-        (lambda: replace(small_case(), seed=-1), r"Case.seed: must be an integer from 0 .* got -1"),
-    ],
-)
-def test_a_bad_value_is_refused_with_rule_and_value(build, message):
-    with pytest.raises(ValueError, match=message):
-        build()
 
 
 def test_the_time_step_is_a_fraction_of_the_smallest_rayleigh_time():

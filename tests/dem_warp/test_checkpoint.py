@@ -256,11 +256,6 @@ def test_a_run_goes_on_if_no_checkpoint_can_be_written(tmp_path, caplog):
     assert "cannot write the checkpoint" in caplog.text
 
 
-def test_an_interval_is_not_negative(tmp_path):
-    with pytest.raises(ValueError, match=r"Checkpoints.every: must be 0 or more \[s\], got -1"):
-        simulate([small_case()], device=DEVICE, checkpoint=tmp_path, checkpoint_every=-1.0)
-
-
 def test_a_snapshot_of_another_world_is_refused_and_changes_nothing():
     solver = solve(pile(), pile(3), precision="mixed")
     untouched, snapshot = take_snapshot(solver, 0), take_snapshot(solver, 1)

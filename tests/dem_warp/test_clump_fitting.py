@@ -111,30 +111,3 @@ def test_bad_mesh_files_are_refused(tmp_path):
         read_mesh(tmp_path / "open.stl")
     with pytest.raises(ValueError, match="unit: must be positive and finite"):
         read_mesh(tmp_path / "open.stl", unit=0.0)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("cube:3", "solid: must be one of sphere:DIAMETER, ellipsoid:LENGTHxWIDTHxTHICKNESS"),
-        ("cylinder:6", "must be cylinder:LENGTHxDIAMETER in mm: got 1 dimensions"),
-        ("ellipsoid:6x3xthin", "must be ellipsoid:LENGTHxWIDTHxTHICKNESS in mm: could not convert"),
-        ("capsule:2x2", "length: must be above the diameter"),
-    ],
-)
-def test_bad_dimensions_are_refused(text, message):
-    with pytest.raises(ValueError, match=message):
-        parse_solid(text)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"sphere_count": 0}, "sphere_count: must be at least 1, got 0"),
-        ({"sphere_count": 1, "protrusion": -1e-4}, "protrusion: must be finite and 0 or more"),
-        ({"sphere_count": 1, "resolution": 4}, "resolution: must be at least 8, got 4"),
-    ],
-)
-def test_bad_requests_are_refused(options, message):
-    with pytest.raises(ValueError, match=message):
-        fit_clump(parse_solid("sphere:4"), **options)

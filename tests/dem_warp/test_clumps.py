@@ -140,29 +140,6 @@ def test_a_bad_file_is_refused_with_its_line(tmp_path, text, message):
         ClumpShape.read(path)
 
 
-@pytest.mark.parametrize(
-    ("centers", "radii", "message"),
-    [
-        (np.zeros((2, 3)), [1.0], r"got \(2, 3\) and \(1,\)"),
-        (np.zeros((0, 3)), [], "S >= 1"),
-        (np.zeros((2, 3)), [1.0, 0.0], r"radii\[1\]: must be positive and finite"),
-        ([[0.0, 0.0, math.inf]], [1.0], r"centers\[0\]: must be finite"),
-    ],
-)
-def test_bad_spheres_are_refused(centers, radii, message):
-    with pytest.raises(ValueError, match=message):
-        ClumpShape.from_spheres(centers, radii)
-
-
-def test_impossible_mass_properties_are_refused():
-    with pytest.raises(ValueError, match="volume: must be positive and finite"):
-        ClumpShape(np.zeros((1, 3)), np.ones(1), -1.0, np.ones(3))
-    with pytest.raises(ValueError, match="inertia_over_mass: must be three positive moments"):
-        ClumpShape(np.zeros((1, 3)), np.ones(1), 1.0, np.zeros(3))
-    with pytest.raises(ValueError, match="resolution: must be 1 or more, got 0"):
-        ClumpShape.from_spheres(np.zeros((1, 3)), [1.0], resolution=0)
-
-
 def test_a_shape_is_a_value():
     one, same, other = ClumpShape.sphere(1e-3), ClumpShape.sphere(1e-3), ClumpShape.sphere(2e-3)
     assert one == same
@@ -197,10 +174,6 @@ def test_a_shape_is_drawn_out_along_its_longest_axis():
     np.testing.assert_allclose(drawn.centers, plate.centers * [1.0, 1.5, 1.0] * scale[:, None], atol=1e-12)
 
 
-def test_an_elongation_of_0_is_the_shape_itself_and_wrong_ones_are_refused():
+def test_an_elongation_of_0_is_the_shape_itself():
     ball = ClumpShape.sphere(1e-3)
     assert ball.elongated(0.0) is ball
-    with pytest.raises(ValueError, match=r"elongation: must be 0 for a shape of one sphere, got 0.1"):
-        ball.elongated(0.1)
-    with pytest.raises(ValueError, match=r"elongation: must be finite and 0 or more, got -0.1"):
-        ball.elongated(-0.1)

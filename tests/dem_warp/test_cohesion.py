@@ -281,16 +281,3 @@ def test_bonds_outlast_rebuilds_in_any_batch():
     # The thin skin is used up again and again (measured: 39 and 805 rebuilds).
     assert often.rebuilds.numpy()[1] > 10 * seldom.rebuilds.numpy()[0]
     assert_same_bits(state(often, 1), state(seldom))
-
-
-@pytest.mark.parametrize(
-    ("kind", "values", "message"),
-    [
-        (WallAdhesion, {"between": "all"}, r"WallAdhesion.between: must be one of walls, got 'all'"),
-        (CapillaryBridge, {"surface_tension": 0.07}, r"CapillaryBridge.bridge_volume: .* got 0.0"),
-        (CapillaryBridge, {"contact_angle": 1.6}, r"CapillaryBridge.contact_angle: .* got 1.6"),
-    ],
-)
-def test_bad_parameters_are_refused(kind, values, message):
-    with pytest.raises(ValueError, match=message):
-        kind(**values)

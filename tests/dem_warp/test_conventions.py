@@ -24,8 +24,6 @@ from worlds import (
 
 from dem_warp.laws.contact_law import contact_law, memory_size
 from dem_warp.laws.conventions import BASE_FORMS, EDEM, PRESETS, RELATIVE, ContactLaws, laws_named
-from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
-from dem_warp.laws.micro_slip import MicroSlip
 from dem_warp.laws.tangential import coulomb_spring, free_spring, sum_spring
 from dem_warp.materials import DAMPINGS
 from dem_warp.parameters import choices_of
@@ -33,32 +31,6 @@ from dem_warp.types import MIXED, Build
 from dem_warp.walls import Plane
 
 SPEED = 0.1
-
-
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: ContactLaws(rolling="none"), r"ContactLaws.rolling: must be one of own_spin, .* got 'none'"),
-        (lambda: ContactLaws(rolling_stiffness=0.0), r"rolling_stiffness: must be positive .* got 0.0"),
-        (lambda: ContactLaws(damping_rate=1.0), r"damping_rate: must be given with .* got 1.0 with 'tsuji'"),
-        (
-            lambda: ContactLaws(normal_damping="mass_velocity", damping_rate=1.0),
-            r"tangential_damping \(with normal_damping mass_velocity\): must be one of normal, none",
-        ),
-        (lambda: laws_named("ligghts"), r"laws: must be one of edem, .* got 'ligghts'"),
-        (
-            lambda: replace(small_case(), laws=RELATIVE, mechanisms=(ElasticPlasticRolling(),)),
-            r"ContactLaws.rolling: must be 'own_spin' with the mechanism elastic_plastic_rolling, got",
-        ),
-        (
-            lambda: replace(small_case(), laws=laws_named("lammps"), mechanisms=(MicroSlip(),)),
-            r"ContactLaws.sliding: must be 'spring' with the mechanism micro_slip, got 'sum'",
-        ),
-    ],
-)
-def test_a_law_that_does_not_exist_or_fit_is_refused_with_rule_and_value(build, message):
-    with pytest.raises(ValueError, match=message):
-        build()
 
 
 def test_sets_of_laws_are_different_and_know_their_names():
@@ -131,12 +103,10 @@ def test_an_impact_has_the_restitution_of_its_damping(restitution, chosen):
 
 
 @pytest.mark.parametrize("restitution", DAMPINGS)
-def test_dampings_fall_with_the_restitution_and_refuse_bad_ones(restitution):
+def test_dampings_fall_with_the_restitution(restitution):
     values = [DAMPINGS[restitution](e) for e in np.linspace(0.1, 1.0, 19)]
     assert (np.diff(values) < 0.0).all()
     assert values[-1] == pytest.approx(0.0, abs=2e-3)  # the polynomial ends at 1.6e-3
-    with pytest.raises(ValueError, match=r"restitution: must be at most 1, got 1\.5"):
-        DAMPINGS[restitution](1.5)
 
 
 @pytest.mark.parametrize("damping", ["mass_velocity", "viscoelastic"])

@@ -170,8 +170,3 @@ def test_a_heap_that_reaches_the_slot_is_a_failure_with_its_reason(drawn):
     assert run.observables["clogged"] == 1
     assert "shear_angle" not in run.observables
     assert run.observables["fallen_mass"] > 0
-
-
-def test_a_slot_as_wide_as_the_boxes_is_refused():
-    with pytest.raises(ValueError, match=r"DrawDown.slot: must be below the width 0.08 \[m\], got 0.08"):
-        replace(BOXES, slot=0.08)

@@ -144,11 +144,6 @@ def test_the_tube_rises_and_grains_that_wait_are_not_shown(filmed: tuple[CaseRes
     assert len(film.frames[0].grains) < len(film.frames[-1].grains) == 20
 
 
-def test_a_film_has_two_frames_or_more() -> None:
-    with pytest.raises(ValueError, match=r"simulate_frames.count: must be 2 or more, got 1"):
-        simulate_frames(CLUMPS, 1, DEVICE)
-
-
 def test_a_case_that_cannot_begin_has_no_film() -> None:
     narrow = small_case(scene=replace(SMALL_TUBE, diameter=1e-3, height=1e-3))
     result, film = simulate_frames(narrow, COUNT, DEVICE)

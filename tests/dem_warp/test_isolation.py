@@ -142,35 +142,3 @@ def test_a_removed_grain_touches_nothing_more():
     assert end["slots"].tolist() == [1]
     # It fell to the plane: at most its radius and the height of a bounce, e^2 = 9 % of the fall, above it.
     assert end["positions"][0, 2] < 1.2 * RADIUS
-
-
-def test_worlds_of_a_batch_need_the_same_number_of_walls():
-    fewer = replace(heap(1), walls=heap(1).walls[:1])
-    with pytest.raises(ValueError, match="must have the same number of walls"):
-        solve(heap(1), fewer)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"time_step": 0.0}, "time_step: must be positive and finite .s., got 0.0"),
-        ({"skin": float("nan")}, "skin: must be positive and finite .m., got nan"),
-        ({"speed_limit": -1.0}, "speed_limit: must be positive and finite .m/s., got -1.0"),
-        ({"weighed": 2}, "weighed: must be the number of a wall, 0 to 1, got 2"),
-        ({"domain": ((0.0, 0.0, 0.0), (1.0, -1.0, 1.0))}, "domain: lower corner must be below the upper"),
-        ({"walls": ((Plane(), 2), (Plane(), 1))}, "WorldSetup.walls: .*2"),
-    ],
-)
-def test_a_world_refuses_bad_values(change, message):
-    with pytest.raises(ValueError, match=message):
-        replace(heap(1), **change)
-
-
-def test_grains_refuse_arrays_that_do_not_fit():
-    bodies = grains([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
-    with pytest.raises(ValueError, match=r"Grains.sizes: must have shape \(2,\), got \(3,\)"):
-        replace(bodies, sizes=np.ones(3))
-    with pytest.raises(ValueError, match=r"Grains.positions: must be finite, got others for grains \[1\]"):
-        replace(bodies, positions=np.array([[0.0, 0.0, 0.0], [np.inf, 0.0, 0.0]]))
-    with pytest.raises(ValueError, match=r"Grains.densities: must be positive, got others for grains \[0\]"):
-        replace(bodies, densities=np.array([0.0, 1.0]))

@@ -80,13 +80,6 @@ def test_grains_fall_over_the_rim_of_a_small_plate():
     assert (result.positions[:, 2] > 0.0).all()
 
 
-def test_a_plate_is_wider_than_the_tube():
-    with pytest.raises(
-        ValueError, match=r"LiftedCylinder.plate_diameter: must be above the tube's .* got 0.01"
-    ):
-        replace(SMALL_TUBE, plate_diameter=0.01)
-
-
 def test_a_case_of_fixed_duration_ends_then():
     scene = replace(SMALL_TUBE, grain_count=8, duration=0.5)
     result = simulate([small_case(scene=scene)], device="cpu", workers=1)[0]
@@ -139,11 +132,6 @@ def test_grains_of_5_and_of_30_spheres_form_a_heap():
 
 def test_no_cases_give_no_results():
     assert simulate([], device="cpu") == []
-
-
-def test_an_unknown_device_is_refused():
-    with pytest.raises(ValueError, match=r"device: must be one of .*cpu.*, got 'gpu'"):
-        simulate([small_case()], device="gpu")
 
 
 def end_of_lift(riding: int) -> tuple[Decision, Decision, float]:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dem_warp.materials import Interaction, Material, damping_coefficient, effective_moduli, rayleigh_time
+from dem_warp.materials import Material, damping_coefficient, effective_moduli, rayleigh_time
 
 GRAIN = Material(density=698.0, shear_modulus=34.325e6, poisson_ratio=0.29)
 STEEL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.30)
@@ -39,29 +39,3 @@ def test_damping_grows_as_restitution_falls_and_stays_below_its_limit():
     values = [damping_coefficient(e) for e in (0.9, 0.5, 0.18, 1e-3, 1e-300)]
     assert values == sorted(values)
     assert values[-1] < 2.0 * math.sqrt(5.0 / 6.0)
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ((0.0, 1e6, 0.3), "density: must be positive and finite"),
-        ((698.0, -1.0, 0.3), "shear_modulus: must be positive and finite"),
-        ((698.0, 1e6, 0.51), "Material.poisson_ratio: must be at most 0.5, got 0.51"),
-    ],
-)
-def test_a_material_refuses_values_out_of_range(values, message):
-    with pytest.raises(ValueError, match=message):
-        Material(*values)
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ((0.0, 0.5, 0.05), "Interaction.restitution: must be positive and finite, got 0.0"),
-        ((1.01, 0.5, 0.05), "Interaction.restitution: must be at most 1, got 1.01"),
-        ((0.5, 0.5, math.inf), "rolling_friction: must be finite and 0 or more, got inf"),
-    ],
-)
-def test_an_interaction_refuses_values_out_of_range(values, message):
-    with pytest.raises(ValueError, match=message):
-        Interaction(*values)

@@ -14,7 +14,6 @@ from worlds import (
     ball_mass,
     ball_on_plane,
     grains,
-    oblique_impact,
     pair,
     pile,
     record,
@@ -28,7 +27,6 @@ from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.contact_law import contact_law
 from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
 from dem_warp.laws.hysteretic_spring import HystereticSpring
-from dem_warp.laws.jkr import JKR
 from dem_warp.laws.kinetic_friction import KineticFriction
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
@@ -133,36 +131,6 @@ def test_a_mechanism_between_grains_does_not_act_on_walls():
     cohesion = LinearCohesion(cohesion_energy_density=1.0, between="grains")
     assert cohesion.acts_between("grains")
     assert not cohesion.acts_between("walls")
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"cohesion_energy_density": -1.0}, r"LinearCohesion.cohesion_energy_density: .* got -1.0"),
-        ({"cohesion_energy_density": float("nan")}, r"must be finite"),
-        ({"between": "friends"}, r"LinearCohesion.between: must be one of .* got 'friends'"),
-    ],
-)
-def test_bad_parameters_are_refused(values, message):
-    with pytest.raises(ValueError, match=message):
-        LinearCohesion(**values)
-
-
-def test_a_contact_takes_a_mechanism_once():
-    with pytest.raises(ValueError, match=r"mechanisms: must be different"):
-        pair(mechanisms=(LinearCohesion(), LinearCohesion()))
-
-
-def test_mechanisms_that_build_on_different_springs_do_not_share_a_contact():
-    with pytest.raises(ValueError, match=r"jkr excludes hysteretic_spring"):
-        pair(mechanisms=(HystereticSpring(plasticity=0.1), JKR(work_of_adhesion=0.1)))
-
-
-def test_one_batch_holds_one_set_of_mechanisms():
-    with pytest.raises(ValueError, match=r"all in a batch must have the same mechanisms"):
-        solve(
-            oblique_impact(), replace(oblique_impact(), contacts=(pair(mechanisms=(LinearCohesion(),)),) * 2)
-        )
 
 
 @pytest.mark.parametrize(

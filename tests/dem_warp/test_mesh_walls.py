@@ -168,23 +168,3 @@ def test_a_world_goes_on_with_its_moving_mesh_in_a_batch_with_another():
         solver.move_wall(w, 0, Motion((0.0, 0.0, -0.01)))
         run_for(solver, 0.02)
     assert_same_bits(state(second, 1), state(whole))
-
-
-def test_worlds_with_and_without_meshes_run_apart():
-    plain = world(grains([0.0, 0.0, 0.02]), CONTACT, TIME_STEP)
-    with pytest.raises(ValueError, match="must have the same use of meshes"):
-        solve(plain, heap_in(BOX, 1))
-
-
-@pytest.mark.parametrize(
-    ("vertices", "faces", "message"),
-    [
-        (np.zeros((3, 2)), [[0, 1, 2]], r"Mesh.vertices: must be finite, shape \(n, 3\) .* \(3, 2\)"),
-        (CORNERS, [[0, 1]], r"Mesh.faces: must be integers, shape \(m, 3\), got int64 of shape \(1, 2\)"),
-        (CORNERS, [[0, 1, 2], [0, 1, 8]], r"from 0 to 7, got others in triangles \[1\]"),
-        (CORNERS, [[0, 1, 2], [0, 0, 3]], r"must have an area, got triangles \[1\] without"),
-    ],
-)
-def test_a_mesh_refuses_bad_values(vertices, faces, message):
-    with pytest.raises(ValueError, match=message):
-        Mesh(vertices, faces)

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import pytest
 import warp as wp
 
 from dem_warp.laws.micro_slip import SPRINGS, MicroSlip, row_force
@@ -129,8 +128,3 @@ def test_no_direction_is_special():
     turn = np.array([[0.6, 0.8], [-0.8, 0.6]])
     # Three hundred steps, each rounded by 1e-16 of forces of about 1.
     np.testing.assert_allclose(forces(overlaps, places @ turn), forces(overlaps, places) @ turn, atol=1e-12)
-
-
-def test_half_a_micro_slip_is_refused():
-    with pytest.raises(ValueError, match=r"MicroSlip.micro_slip: must be .* got 0.5"):
-        MicroSlip(micro_slip=0.5)

@@ -22,20 +22,6 @@ def mixed(shape: ShapeMixture = BOTH) -> GrainPopulation:
     return GrainPopulation(shape, GRAIN, size_mean=1.1, size_sd=0.1)
 
 
-@pytest.mark.parametrize(
-    ("shapes", "fractions", "message"),
-    [
-        ((), (), r"ShapeMixture.shapes: must hold at least one shape, got none"),
-        ((BALL, BOOT), (1.0,), r"ShapeMixture.fractions: must be one for each of 2 shapes, got 1"),
-        ((BALL, BOOT), (1.2, -0.2), r"ShapeMixture.fractions\[1\]: must be finite and 0 or more, got -0.2"),
-        ((BALL, BOOT), (0.5, 0.4), r"fractions: must add up to 1, got \(0.5, 0.4\), together 0.9"),
-    ],
-)
-def test_bad_fractions_are_refused_with_rule_and_value(shapes, fractions, message):
-    with pytest.raises(ValueError, match=message):
-        ShapeMixture(shapes, fractions)
-
-
 def test_shapes_come_out_binomially():
     # In 400 draws of 50 grains the count of a shape has the mean and the variance of a binomial, within four
     # standard errors: sqrt(np(1-p) / 400), and for the variance, of nearly normal counts, sqrt(2 / 400).
@@ -198,34 +184,6 @@ def test_a_seed_draws_the_same_sizes_after_other_draws() -> None:
     POPULATION.draw(70, 6)
     assert np.array_equal(POPULATION.draw(50, 5).sizes, first)
     assert not np.array_equal(POPULATION.draw(50, 6).sizes, first)
-
-
-@pytest.mark.parametrize(
-    ("sizes", "fractions", "message"),
-    [
-        ((), (), r"SizeClasses.fractions: must be one for each of 0 sizes, got 0"),
-        ((1.0,), (0.5, 0.5), r"SizeClasses.fractions: must be one for each of 1 sizes, got 2"),
-        (
-            (1.0, 0.9),
-            (0.5, 0.5),
-            r"SizeClasses.sizes: must be positive, finite and increasing, got \(1.0, 0.9\)",
-        ),
-        (
-            (0.9, 1.1),
-            (0.5, 0.4),
-            r"SizeClasses.fractions: must add up to 1, got \(0.5, 0.4\)",
-        ),
-        ((0.9, 1.1), (1.0, 0.0), r"SizeClasses.fractions: must be positive"),
-    ],
-)
-def test_bad_classes_are_refused_with_rule_and_value(sizes, fractions, message) -> None:
-    with pytest.raises(ValueError, match=message):
-        SizeClasses(sizes, fractions)
-
-
-def test_another_mean_than_that_of_the_classes_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"size_mean: must be that of the classes, .* got 1.0"):
-        GrainPopulation(PYRAMID, GRAIN, 1.0, 0.05, CLASSES)
 
 
 TUBE = 0.012
