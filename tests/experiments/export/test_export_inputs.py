@@ -13,7 +13,8 @@ from typing import get_args
 import numpy as np
 import pytest
 from commandline import dem_warp, refused
-from exported_lift import COUNT, GRAIN, exported_lift
+from exported_lift import COUNT, GRAIN, ROD
+from exported_lift import exported_lift as exported
 
 from dem_warp import PRESETS, ClumpShape, ContactLaws, ShapeMixture
 from dem_warp.laws.conventions import Rolling
@@ -27,17 +28,12 @@ from experiments.io.errors import InputError
 from experiments.studyfile import load_study
 
 SPHERE = ClumpShape.sphere(1e-3)
-ROD = ClumpShape.from_spheres([[-1e-3, 0, 0], [0, 0, 0], [1e-3, 0, 0]], [1e-3] * 3)
 PROGRAMS = {"liggghts": "liggghts", "lammps": "lmp"}
 """Codes with an input in their own language, and their programs."""
 
 with_programs = pytest.mark.parametrize(
     "code", [pytest.param(code, marks=pytest.mark.program(name)) for code, name in PROGRAMS.items()]
 )
-
-
-def exported(laws: str, shape: ClumpShape | ShapeMixture = ROD, **changes: object) -> ExportedTest:
-    return exported_lift(laws, shape, **changes)
 
 
 def test_classes_of_size_have_the_populations_moments() -> None:

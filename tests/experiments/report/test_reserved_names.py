@@ -11,13 +11,10 @@ from experiments.studyfile import Study, load_study
 from experiments.studyfile.reserved_names import RESERVED
 
 
-def with_factor(write_study: Callable[..., Path], name: str) -> Study:
-    return load_study(write_study(('name = "E"', f'name = "{name}"')))
-
-
 @pytest.mark.parametrize("name", ["E", "mu_2", "Seed"])
 def test_any_other_name_will_do(write_study: Callable[..., Path], name: str) -> None:
-    assert with_factor(write_study, name).factors[0].name == name
+    study = load_study(write_study(('name = "E"', f'name = "{name}"')))
+    assert study.factors[0].name == name
 
 
 def test_the_reserved_names_are_those_of_the_tables(campaign: Campaign, study: Study) -> None:

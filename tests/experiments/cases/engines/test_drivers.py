@@ -12,12 +12,11 @@ import pytest
 from commandline import install
 
 from dem_warp import CaseResult
-from dem_warp.laws.conventions import PRESETS
 from experiments.cases import Store, engine_of, simulate_heap
 from experiments.cases.engines.driver import Driver
 from experiments.cases.engines.engine import NO_ANSWER
 from experiments.cases.engines.program import ProgramEngine
-from experiments.export import EXPORTERS, ExportedTest, export_input
+from experiments.export import ExportedTest, export_input
 from experiments.io.errors import InputError
 from experiments.studyfile import Study, load_study
 
