@@ -11,9 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista
+import warp
 from commandline import dem_warp
 from cone_engine import SEEDS, cone_engine, observe, without_pages
 
+from dem_warp import simulation
 from experiments.cases import execute
 from experiments.cases.engines import engines
 from experiments.cases.show import heap
@@ -21,7 +24,7 @@ from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover import engine_simulator
 from experiments.runs import bridging, calibration, one_heap, search
 
-LOADED = (bridging, calibration, one_heap, search)
+LOADED = (bridging, calibration, one_heap, pyvista, search, simulation, warp)
 """Modules that each process would load anew."""
 
 KILLS = 10
