@@ -20,7 +20,7 @@ from experiments.cases.forecast.speed import (
     noted_speed,
     source_of,
 )
-from experiments.cases.forecast.work import Work, rest_of, work_of
+from experiments.cases.forecast.work import Work, _phases, rest_of, work_of
 from experiments.cases.workers.call_results import CallResults, ExpectedProgress
 from experiments.commands.console import describe_progress
 from experiments.studyfile import Study
@@ -31,6 +31,7 @@ WORK = Work("balls", 100, 100, 1.0e-5, 1.0e6)
 @pytest.fixture(autouse=True)
 def notes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(speed, "NOTES", str(tmp_path / "notes" / "batches.json"))
+    _phases.cache_clear()  # a case of an earlier test may have the same scene
     return tmp_path / "notes" / "batches.json"
 
 
