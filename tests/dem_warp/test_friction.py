@@ -30,7 +30,7 @@ from dem_warp.laws.rate_weakening import RateWeakening
 from dem_warp.materials import rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.solver import CHUNK, Solver
-from dem_warp.walls import Plane
+from dem_warp.walls import Motion, Plane
 
 SPEED = 0.1
 
@@ -52,6 +52,23 @@ def test_a_sliding_ball_comes_to_roll():
     assert rolling == pytest.approx(5.0 / 7.0 * SPEED, rel=1e-3)
     assert end["velocities"][0, 0] == pytest.approx(rolling, rel=1e-6)
     assert end["spins"][0, 1] * lever(contact) == pytest.approx(rolling, rel=1e-6)
+
+
+def test_a_moving_belt_takes_a_ball_along():
+    belt, contact = 0.3, pair(restitution=0.2, friction=0.3)
+    solver = solve(ball_on_plane(contact))
+    solver.move_wall(0, 0, Motion(velocity=(belt, 0.0, 0.0)))
+    solver.advance(1)
+    # It slides at first: mu g, taken up by the spring within the first of 256 steps.
+    sliding = 0.3 * GRAVITY * CHUNK * TIME_STEP
+    assert state(solver)["velocities"][0, 0] == pytest.approx(sliding, rel=0.01)
+    run_for(solver, 0.08)
+    # In the belt's frame it rolls at 5/7 of its first speed in the end: 2/7 in the laboratory's, up to the
+    # overlap in the lever.
+    arm, end = lever(contact), state(solver)
+    rolling = belt * (1.0 - 1.0 / (1.0 + 0.4 * (RADIUS / arm) ** 2))
+    assert end["velocities"][0, 0] == pytest.approx(rolling, rel=1e-6)
+    assert end["spins"][0, 1] * arm == pytest.approx(rolling - belt, rel=1e-6)
 
 
 @pytest.mark.parametrize("damped", [True, False])

@@ -122,6 +122,19 @@ def test_damping_that_may_not_attract_returns_a_higher_restitution(chosen, comes
         assert impact.force.min() >= 0.0
 
 
+def test_spheres_of_different_size_keep_their_momentum():
+    contact, sizes = pair(restitution=0.3, friction=0.5), np.array([1.0, 0.6])
+    masses = ball_mass() * sizes**3
+    velocities = [[0.0, 0.03, 0.0], [0.0, -0.01, -SPEED]]
+    dt = Impact.of(contact, RADIUS / 2.0, masses[1], SPEED).duration / 100.0
+    bodies = grains([[0.0, 0.0, 0.0], [0.0, 0.001, 1.605 * RADIUS]], velocities=velocities, sizes=sizes)
+    seen = record(solve(world(bodies, contact, dt)), 400).velocities
+    assert seen[-1, 0, 2] < 0.0
+    # Opposite forces of equal size: rounding only, of 1e-16 a step.
+    momentum = np.einsum("g,tgi->ti", masses, seen)
+    np.testing.assert_allclose(momentum - momentum[0], 0.0, atol=1e-14 * masses[0])
+
+
 def slide(restitution: float, friction: float, clamp: bool, angles: np.ndarray):
     """Return kicks and twists, (steps, angles, 3), of spheres thrown on a plane at angles from its normal."""
     contact = pair(restitution, friction, clamp=clamp)

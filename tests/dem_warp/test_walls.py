@@ -101,6 +101,25 @@ def test_an_elastic_impact_keeps_the_energy(wall, place, velocity):
     assert lost[1] < 1e-3 / 16.0
 
 
+def test_the_wall_of_a_cone_carries_what_a_circling_ball_asks_for():
+    # On a frictionless funnel of half angle a ball circles level at v^2 = g rho cot(a), rho the distance of
+    # its centre from the axis, and the wall carries m g / sin(a).
+    angle = math.radians(30.0)
+    inward = np.array([-math.cos(angle), 0.0, math.sin(angle)])
+    overlap = static_overlap(pair(), ball_mass() * GRAVITY / math.sin(angle))
+    place = [0.04 * math.sin(angle), 0.0, 0.04 * math.cos(angle)] + (RADIUS - overlap) * inward
+    speed = math.sqrt(GRAVITY * place[0] / math.tan(angle))
+    funnel = Cone((0.0, 0.0, 0.0), 0.0, 0.05 * math.tan(angle), 0.05)
+    ball = grains(place, velocities=[0.0, speed, 0.0])
+    solver = solve(world(ball, pair(), TIME_STEP, walls=(funnel,), gravity=downhill(0.0)))
+    run_for(solver, math.pi * place[0] / speed)
+    [end], [velocity] = state(solver)["positions"], state(solver)["velocities"]
+    # Symplectic Euler keeps the orbit to first order of the time step: g dt over the speed, 1e-4 of it.
+    assert end[0] < -0.8 * place[0]
+    assert [np.hypot(*end[:2]), end[2]] == pytest.approx([place[0], place[2]], rel=1e-3)
+    assert np.linalg.norm(velocity) == pytest.approx(speed, rel=1e-3)
+
+
 CHUNK_TIME = 256 * TIME_STEP
 
 
