@@ -14,7 +14,6 @@ import random
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -27,7 +26,8 @@ import typer
 from experiments.cases.store.folder import is_used
 from experiments.evidence.machine import machine
 from experiments.evidence.performance.result_pages import write_results
-from experiments.io.files import has_temporary_name
+from experiments.io.files import JOURNAL, has_temporary_name
+from experiments.live.ui.started_runs import PROGRAM
 
 STUDY = Path(__file__).with_name("kill_study.toml")
 """A campaign of 20 cases of 60 balls: three batches, every table of the report."""
@@ -36,9 +36,6 @@ CAMPAIGN = ("calibrate", str(STUDY), "--device", "cpu", "--workers", "2")
 
 OF_THE_RUN = ("files.json", "report.html", "wall_times.csv", ".lock")
 """Files that hold the day and the duration of a run."""
-
-JOURNAL = ".live"
-"""Folder in which a run reports its progress."""
 
 MOST = 6
 """Kills of one run."""
@@ -67,16 +64,15 @@ class Kill:
     """Wall time since its start [s]."""
     kept: int
     """Number of cases that were finished then."""
-    fault: str = ""
+    fault: str
 
 
 def start(words: Sequence[str], folder: Path) -> subprocess.Popen[bytes]:
     """Start a command in a folder, which it resumes if it can; its messages go to a file next to it."""
     more = ["--resume"] if is_used(folder) else []
     with folder.with_suffix(".txt").open("wb") as messages:
-        program = [sys.executable, "-c", "from experiments.cli import main; main()"]
         return subprocess.Popen(
-            [*program, *words, "--out", str(folder), *more], stdout=messages, stderr=messages
+            [*PROGRAM, *words, "--out", str(folder), *more], stdout=messages, stderr=messages
         )
 
 
@@ -159,9 +155,8 @@ def killed_run(
             before = now
     last = start(words, folder)
     if run % 4 == 0 and is_used(folder):
-        program = [sys.executable, "-c", "from experiments.cli import main; main()"]
         second = subprocess.run(
-            [*program, *words, "--out", str(folder), "--resume"], capture_output=True, check=False
+            [*PROGRAM, *words, "--out", str(folder), "--resume"], capture_output=True, check=False
         )
         if last.poll() == BUSY:
             # the second was faster to the lock: it has run, and the first was refused

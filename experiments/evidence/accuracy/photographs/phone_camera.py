@@ -22,8 +22,7 @@ class PhoneCamera:
     """Share of the columns that the heap covers."""
     tilt: float = 0.0
     """About the line of sight [degrees]."""
-    aside: float = 0.0
-    above: float = 0.0
+    middle: tuple[float, float] = (0.0, 0.0)
     """Place of the heap's middle, in columns and rows from the picture's middle, as shares of them."""
     height: float = 0.2
     """Height of the point that the camera aims at."""
@@ -54,7 +53,7 @@ class PhoneCamera:
 
     @property
     def _middle(self) -> FloatArray:
-        return np.array([(0.5 + self.aside) * self.columns, (0.5 + self.above) * self.rows])
+        return np.array([(0.5 + self.middle[0]) * self.columns, (0.5 + self.middle[1]) * self.rows])
 
     @property
     def _corner(self) -> float:

@@ -28,7 +28,6 @@ class GrainHeap:
     """Standard deviation of the grains' height over the cone, in diameters."""
     strays: int = 0
     """Number of grains that lie around the heap."""
-    seed: int = 0
 
     @property
     def height(self) -> float:
@@ -45,9 +44,9 @@ class GrainHeap:
         fall = np.where(radius < cap, 0.5 * (radius**2 / cap + cap), radius)
         return np.asarray(slope * (1.0 - fall))
 
-    def spheres(self) -> tuple[FloatArray, FloatArray]:
-        """Centres (n, 3) and radii (n,) of the grains."""
-        rng = np.random.default_rng(self.seed)
+    def spheres(self, seed: int) -> tuple[FloatArray, FloatArray]:
+        """Centres (n, 3) and radii (n,) of the grains, which a seed draws."""
+        rng = np.random.default_rng(seed)
         steep = 1.0 / np.cos(np.radians(self.angle))
         count = int(SURFACE_LAYERS * 4.0 * steep / self.grain**2)
         radius, turn = np.sqrt(rng.uniform(0.0, 1.1, count)), rng.uniform(0.0, 2.0 * np.pi, count)

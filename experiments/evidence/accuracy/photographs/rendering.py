@@ -39,6 +39,16 @@ class Lamp:
 
 
 @dataclass(frozen=True)
+class Top:
+    """Table's top, from -half_width to half_width and from -near to far, and its thickness [heap radii]."""
+
+    half_width: float = 50.0
+    near: float = 1.5
+    far: float = 2.0
+    thickness: float = 50.0
+
+
+@dataclass(frozen=True)
 class Surroundings:
     """Wall and table."""
 
@@ -49,11 +59,7 @@ class Surroundings:
     """Colours of the wall, of the table's top and of its front, and of the grains."""
     spread: float = 0.15
     """Relative standard deviation of the grains' lightness."""
-    half_width: float = 50.0
-    near: float = 1.5
-    far: float = 2.0
-    thickness: float = 50.0
-    """The table's top reaches from -half_width to half_width, and from -near to far [heap radii]."""
+    top: Top = Top()
     wall_distance: float = 4.0
     """Colour of the wall behind the heap."""
     texture: float = 0.0
@@ -68,7 +74,6 @@ class Phone:
     noise: float = 2.0
     sharpening: float = 0.3
     quality: int = 85
-    seed: int = 0
 
 
 def render(
@@ -78,6 +83,7 @@ def render(
     lamp: Lamp,
     camera: PhoneCamera,
     phone: Phone,
+    seed: int,
 ) -> Picture:
     """Draw and store a photograph, (rows, columns, 3) uint8 in blue-green-red.
 
@@ -87,8 +93,10 @@ def render(
         Centres (n, 3) and radii (n,) in heap radii.
     heap_height
         Height of the cone that casts the shadow.
+    seed
+        Seed of patterns, lightness and noise.
     """
-    rng = np.random.default_rng(phone.seed)
+    rng = np.random.default_rng(seed)
     fine = _surroundings(surroundings, lamp, camera, (heap_height, *spheres), rng)
     _draw_grains(fine, spheres, surroundings, lamp, camera, rng)
     size = (camera.columns, camera.rows)
@@ -125,12 +133,12 @@ def _surroundings(
     down = np.minimum(ray[..., 2], -1e-6)
     to_top = -z0 / down
     top_x, top_y = x0 + to_top * ray[..., 0], y0 + to_top * ray[..., 1]
-    top = (ray[..., 2] < 0) & (np.abs(top_x) <= around.half_width)
-    top &= (top_y >= -around.near) & (top_y <= around.far)
-    to_front = (-around.near - y0) / ray[..., 1]
+    top = (ray[..., 2] < 0) & (np.abs(top_x) <= around.top.half_width)
+    top &= (top_y >= -around.top.near) & (top_y <= around.top.far)
+    to_front = (-around.top.near - y0) / ray[..., 1]
     front_z = z0 + to_front * ray[..., 2]
-    front = (front_z <= 0.0) & (front_z >= -around.thickness)
-    front &= np.abs(x0 + to_front * ray[..., 0]) <= around.half_width
+    front = (front_z <= 0.0) & (front_z >= -around.top.thickness)
+    front &= np.abs(x0 + to_front * ray[..., 0]) <= around.top.half_width
     front &= ~top
     to_wall = (around.wall_distance - y0) / ray[..., 1]
     image = np.empty((*ray.shape[:2], 3), dtype=np.float32)

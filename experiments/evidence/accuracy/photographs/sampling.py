@@ -6,7 +6,14 @@ import numpy as np
 
 from experiments.evidence.accuracy.photographs.phone_camera import PhoneCamera
 from experiments.evidence.accuracy.photographs.photographed_heaps import GrainHeap
-from experiments.evidence.accuracy.photographs.rendering import Color, Lamp, Phone, Surroundings, render
+from experiments.evidence.accuracy.photographs.rendering import (
+    Color,
+    Lamp,
+    Phone,
+    Surroundings,
+    Top,
+    render,
+)
 from imaging import ReposeAngle, find_outline, measure, silhouette
 from imaging.geometry import FloatArray, Picture
 
@@ -47,7 +54,7 @@ def photograph_of_a_low_heap(seed: int) -> Photograph:
 
 
 def _shot(rng: np.random.Generator, seed: int, hard: bool = False, low: bool = False) -> Photograph:
-    heap = _heap(rng, seed)
+    heap = _heap(rng)
     if low:
         heap = replace(heap, angle=float(rng.uniform(6.0, 15.0)))
     setting = str(rng.choice(SETTINGS, p=(0.35, 0.4, 0.25)))
@@ -55,7 +62,8 @@ def _shot(rng: np.random.Generator, seed: int, hard: bool = False, low: bool = F
     around = _surroundings(rng, setting)
     if hard:
         behind = rng.uniform(1.1, 2.0)
-        around = replace(around, wall_distance=behind, far=min(around.far, behind))
+        top = replace(around.top, far=min(around.top.far, behind))
+        around = replace(around, wall_distance=behind, top=top)
         lamp = _hard_lamp(rng, heap, behind)
     else:
         lamp = _lamp(rng)
@@ -64,10 +72,9 @@ def _shot(rng: np.random.Generator, seed: int, hard: bool = False, low: bool = F
         noise=rng.uniform(0.5, 6.0),
         sharpening=float(rng.choice([0.0, 0.3, 0.8])),
         quality=int(rng.integers(60, 96)),
-        seed=seed,
     )
-    spheres = heap.spheres()
-    picture = render(spheres, heap.height, around, lamp, camera, phone)
+    spheres = heap.spheres(seed)
+    picture = render(spheres, heap.height, around, lamp, camera, phone, seed)
     return Photograph(picture, true_angle(*spheres), setting, camera, heap, lamp.shadow)
 
 
@@ -77,7 +84,7 @@ def true_angle(centers: FloatArray, radii: FloatArray) -> ReposeAngle:
     return measure(find_outline(exact.image, exact.ground_row, place="exact outline"))
 
 
-def _heap(rng: np.random.Generator, seed: int) -> GrainHeap:
+def _heap(rng: np.random.Generator) -> GrainHeap:
     powder = rng.uniform() < 0.2
     return GrainHeap(
         angle=float(rng.triangular(14.0, 30.0, 44.0)),
@@ -86,7 +93,6 @@ def _heap(rng: np.random.Generator, seed: int) -> GrainHeap:
         grain=0.035 if powder else float(rng.uniform(0.035, 0.09)),
         jitter=0.0 if powder else float(rng.uniform(0.05, 0.2)),
         strays=int(rng.choice([0, 0, 3, 10])),
-        seed=seed,
     )
 
 
@@ -105,8 +111,7 @@ def _camera(rng: np.random.Generator, heap: GrainHeap) -> PhoneCamera:
         elevation=float(elevation),
         share=rng.uniform(0.4, 0.72),
         tilt=float(np.clip(rng.normal(0.0, 1.5), -6.0, 6.0)),
-        aside=rng.uniform(-0.06, 0.06),
-        above=rng.uniform(0.0, 0.12),
+        middle=(rng.uniform(-0.06, 0.06), rng.uniform(0.0, 0.12)),
         height=rng.uniform(0.1, 0.9) * heap.height,
         bulge=rng.uniform(-0.03, 0.03),
     )
@@ -129,18 +134,12 @@ def _surroundings(rng: np.random.Generator, setting: str) -> Surroundings:
         if min(_distance(grain, wall), _distance(grain, table)) < LEAST_CONTRAST:
             continue
         if setting == "sheet":
-            return replace(around, near=30.0, far=4.0, thickness=1.0, front=wall)
+            return replace(around, top=Top(near=30.0, far=4.0, thickness=1.0), front=wall)
         if _distance(wall, table) < 15.0:
             continue
         if setting == "table":
-            return replace(around, near=rng.uniform(1.3, 4.0), far=rng.uniform(1.2, 3.0))
-        return replace(
-            around,
-            half_width=rng.uniform(1.2, 1.7),
-            near=rng.uniform(1.1, 1.5),
-            far=rng.uniform(1.1, 1.5),
-            thickness=rng.uniform(0.06, 0.25),
-        )
+            return replace(around, top=Top(near=rng.uniform(1.3, 4.0), far=rng.uniform(1.2, 3.0)))
+        return replace(around, top=Top(*rng.uniform([1.2, 1.1, 1.1, 0.06], [1.7, 1.5, 1.5, 0.25])))
     raise RuntimeError("colours of enough contrast are common")
 
 

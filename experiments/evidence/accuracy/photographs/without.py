@@ -20,7 +20,7 @@ def picture_without_heap(seed: int) -> tuple[str, Picture]:
     canvas = np.empty((ROWS, COLUMNS, 3), dtype=np.float32)
     canvas[:] = _color(rng)
     PAINTERS[kind](canvas, rng)
-    phone = Phone(rng.uniform(0.4, 2.0), rng.uniform(0.5, 6.0), 0.3, int(rng.integers(60, 96)), seed)
+    phone = Phone(rng.uniform(0.4, 2.0), rng.uniform(0.5, 6.0), 0.3, int(rng.integers(60, 96)))
     return kind, stored(canvas, phone, rng)
 
 
