@@ -27,8 +27,10 @@ def show_stage(name: str, result: StageResult) -> None:
 
 
 def print_study(study: Study, resources: Resources) -> None:
-    """Print the study, its workers, and doubts about it."""
-    messages.print(f"{study.name}, on {resources}", study.note, sep="\n")
+    """Print the study, its workers, the programs that it starts, and doubts about it."""
+    engine = study.engine and (study.engine.command or study.engine.name)
+    by = f", simulated by the program: {engine}" if engine else ""
+    messages.print(f"{study.name}, on {resources}{by}", study.note, sep="\n")
     print_narrowness(study)
 
 

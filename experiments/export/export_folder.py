@@ -13,6 +13,7 @@ from experiments.export.laws import Translated
 from experiments.io.errors import InputError, Problem
 from experiments.io.files import write_text
 from experiments.io.program_version import program_version
+from experiments.io.texts import safe_text
 
 README = "README.md"
 """File about the translation."""
@@ -68,7 +69,7 @@ def _head(test: ExportedTest, to: str, translation: Translation) -> str:
     ]
     lines += [EXPORTERS[to].unproven] if EXPORTERS[to].unproven else []
     lines += [f"WARNING: {warning}" for warning in translation.warnings]
-    return "".join(f"{translation.comment} {line}\n" for line in lines)
+    return "".join(f"{translation.comment} {safe_text(line)}\n" for line in lines)
 
 
 def readme(test: ExportedTest, to: str, translation: Translation) -> str:
@@ -78,7 +79,9 @@ def readme(test: ExportedTest, to: str, translation: Translation) -> str:
     if exporter.unproven:
         parts.append(f"**{exporter.unproven}**\n")
     if translation.warnings:
-        parts.append("## Not the same there\n\n" + "".join(f"- {text}\n" for text in translation.warnings))
+        parts.append(
+            "## Not the same there\n\n" + "".join(f"- {safe_text(text)}\n" for text in translation.warnings)
+        )
     if translation.command:
         parts.append(_running(test, translation))
     if test.settings:
@@ -122,4 +125,7 @@ def _running(test: ExportedTest, translation: Translation) -> str:
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(str(cell).replace('|', '/') for cell in line)} |\n" for line in lines)
+    return "".join(
+        f"| {' | '.join(' '.join(str(cell).replace('|', '/').split()) for cell in line)} |\n"
+        for line in lines
+    )

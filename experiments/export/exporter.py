@@ -10,11 +10,12 @@ from dem_warp import Case, Material
 from experiments.export.contact import Contact, Term
 from experiments.export.laws import LawsOfCode, Translated
 from experiments.io.errors import InputError
+from experiments.io.texts import safe_text
 
 
 @dataclass(frozen=True)
 class ExportedTest:
-    """One case to be exported, with its origin.
+    """One case to be exported, with its origin; each of its texts becomes a `safe_text`.
 
     Raises
     ------
@@ -34,6 +35,10 @@ class ExportedTest:
     """Description of how the angle is read."""
 
     def __post_init__(self) -> None:
+        for text in ("name", "source", "estimator"):
+            object.__setattr__(self, text, safe_text(getattr(self, text)))
+        settings = {safe_text(name): safe_text(value) for name, value in self.settings.items()}
+        object.__setattr__(self, "settings", settings)
         if parts := [part.name for part in self.case.wall_parts]:
             rule = f"all walls must be of one material, but {', '.join(parts)} have their own"
             raise InputError(self.source, rule)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -10,6 +12,7 @@ from experiments.export.exporter import Exporter, Translation
 from experiments.export.laws import Translated
 from experiments.export.lift import Lift
 from experiments.export.lift_rows import lift_rows, lift_warnings
+from experiments.io.texts import safe_cell
 
 SHEET, VALUES, SPHERES = "values.md", "values.csv", "spheres.csv"
 
@@ -140,8 +143,9 @@ def _markdown(rows: Sequence[Sequence[str]]) -> str:
 
 
 def _csv(rows: Sequence[Sequence[str]]) -> str:
-    quoted = ([f'"{cell}"' if "," in cell else cell for cell in row] for row in rows)
-    return "".join(",".join(row) + "\n" for row in quoted)
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([safe_cell(cell) for cell in row] for row in rows)
+    return text.getvalue()
 
 
 EDEM, ROCKY = sheet_exporter("edem"), sheet_exporter("rocky")

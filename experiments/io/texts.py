@@ -17,10 +17,15 @@ _MARKS = {
     codecs.BOM_UTF32_LE: "UTF-32", codecs.BOM_UTF32_BE: "UTF-32",
     codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-16",
 }  # fmt: skip
+_HARMLESS = frozenset(" .,:;()[]+-_=/%'")
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _NUMBER = re.compile(
     r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE
 )
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
+
+LONGEST = 200
+"""Characters of the longest text that a file for another program gets."""
 
 DELIMITERS = (";", "\t", None, ",")
 """Delimiters of a table, in the order in which they are tried; None: blanks."""
@@ -86,6 +91,22 @@ def delimiter_of(line: str) -> str | None:
         if len(cells) > 1 and all(is_number(cell, delimiter) for cell in cells):
             return delimiter
     return None
+
+
+def safe_text(text: str) -> str:
+    """Return a text as one line that is data in a comment, string, table or heading of any language.
+
+    Everything but letters, digits and marks that end, continue or call nothing becomes a blank: line breaks,
+    quotes, backslashes, backticks, ``& $ * # < > { }``. Without a word left it is ``unnamed``.
+    """
+    kept = "".join(letter if letter.isalnum() or letter in _HARMLESS else " " for letter in text)
+    return " ".join(kept.split())[:LONGEST].lstrip("=+-@ ") or "unnamed"
+
+
+def safe_cell(cell: object) -> object:
+    """Return a cell of a table whose text no spreadsheet takes for a formula."""
+    formula = isinstance(cell, str) and cell.startswith(_FORMULA) and not is_number(cell)
+    return f"'{cell}" if formula else cell
 
 
 def nearest_name(name: str, known: list[str]) -> str:

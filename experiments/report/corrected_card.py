@@ -9,6 +9,7 @@ from typing import Any
 
 from experiments.bridge.result import Crossing
 from experiments.io.files import copy_file, write_text
+from experiments.io.texts import safe_text
 from experiments.io.toml_files import toml_text
 from experiments.report.material_card import CARD, compatible_points, quantity_text, sample_table, short
 from experiments.studyfile.card import BRIDGE, MATERIAL, SECTIONS, files_of
@@ -35,7 +36,7 @@ def write_crossing(crossing: Crossing, folder: Path) -> None:
         source = Path(table[key])
         table[key] = source.name
         copy_file(source, folder / source.name)
-    write_text(folder / CARD, HEAD.format(engine=crossing.engine) + toml_text(card))
+    write_text(folder / CARD, HEAD.format(engine=safe_text(crossing.engine)) + toml_text(card))
 
 
 def corrected_card(crossing: Crossing) -> dict[str, Any]:

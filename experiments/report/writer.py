@@ -15,6 +15,7 @@ from experiments.calibrate.results import Campaign
 from experiments.io.files import write_text
 from experiments.io.plain_data import jsonable
 from experiments.io.program_version import program_version
+from experiments.io.texts import safe_cell
 from experiments.report.campaign_page import render_page
 from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
@@ -67,9 +68,14 @@ def write_files(
     whole = {"study": about, **results, "provenance": jsonable(made_by)}
     text = json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     for name, table in tables.items():
-        write_text(folder / "tables" / f"{name}.csv", table.to_csv(index=False))
+        write_text(folder / "tables" / f"{name}.csv", _csv_text(table))
     write_text(folder / "results.json", text)
     write_text(folder / PAGE, page)
+
+
+def _csv_text(table: pd.DataFrame) -> str:
+    texts = table.select_dtypes(exclude="number")
+    return table.assign(**{name: texts[name].map(safe_cell) for name in texts}).to_csv(index=False)
 
 
 def library_versions() -> dict[str, str]:

@@ -56,6 +56,13 @@ class ClusterSection(Section):
             raise ValueError('must be a size with its unit, e.g. "4 GB"')
         return memory
 
+    @field_validator("queue", "account", "python", "interface", "shared")
+    @classmethod
+    def _is_a_line(cls, text: str | None) -> str | None:
+        if text is not None and not _LINE.fullmatch(text):
+            raise ValueError(f"must be one line, got {text!r}")
+        return text
+
     @field_validator("directives", "prologue")
     @classmethod
     def _are_lines(cls, lines: tuple[str, ...]) -> tuple[str, ...]:

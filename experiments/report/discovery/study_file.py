@@ -12,6 +12,7 @@ import numpy as np
 from doe import Sample
 from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
 from experiments.io.files import write_text
+from experiments.io.texts import safe_text
 from experiments.io.toml_files import toml_text
 from experiments.measurement.measured_target import Replicated, target_sections
 from experiments.report.clump_files import gather_clumps
@@ -48,7 +49,9 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
         gather_clumps(document, study.file.parent, folder)
         path = folder / f"study-with-{'-and-'.join(name for name, _ in candidate)}.toml"
         title = terms.titles(name for name, _ in candidate)
-        head = HEAD.format(name=study.name, title=title, file=path.name, study=study_hash(study))
+        head = HEAD.format(
+            name=safe_text(study.name), title=safe_text(title), file=path.name, study=study_hash(study)
+        )
         write_text(path, head + toml_text(document))
         written.append(path)
     return written

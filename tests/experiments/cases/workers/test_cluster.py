@@ -161,6 +161,7 @@ def test_a_scheduler_that_does_not_answer_ends_with_2(
         ('kind = "cloud"', "'local', 'slurm'"),
         ('memory = "plenty"', 'a size with its unit, e.g. "4 GB"'),
         ('directives = ["-p main\\nrm -rf ~"]', "one line each"),
+        ('queue = "main\\nrm -rf ~"', "must be one line"),
         ("worker = 2", "did you mean 'workers'?"),
         ('walltime = "30 s"', "greater than or equal to 60"),
     ],
