@@ -7,11 +7,13 @@ import logging
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
+from pathlib import Path
 from typing import Any
 
 from dem_warp.batch import OnAdvance, begin
@@ -31,6 +33,9 @@ NO_CASE = -1
 
 LOSSES = 3
 """Losses of processes in a row, without an ended case, after which a call fails."""
+
+GUARD = 'if __name__ == "__main__":'
+"""Line without which a script cannot start processes: each of them imports the script."""
 
 Report = Callable[[Sequence[float], Sequence[str]], None]
 """Callback with the fraction done and the phase of every case."""
@@ -78,6 +83,21 @@ def _start(states: Any, started: Any) -> None:
         number = started.value
         started.value += 1
     _own.append(states[number])
+
+
+def require_guard() -> None:
+    """End a script that never looks at its ``__name__`` in one sentence, before its processes run it again.
+
+    Raises
+    ------
+    SystemExit
+        If this program is such a script.
+    """
+    main = sys.modules["__main__"]
+    path = Path(getattr(main, "__file__", None) or "")
+    is_script = main.__spec__ is None and path.suffix == ".py" and path.is_file()
+    if is_script and "__name__" not in path.read_text(encoding="utf-8", errors="replace"):
+        raise SystemExit(f"{path}: needs {GUARD} above the call: its worker processes import this file.")
 
 
 def end_with_parent() -> None:
@@ -189,6 +209,7 @@ class Processes:
 
     def _started(self) -> ProcessPoolExecutor:
         if self._pool is None:
+            require_guard()
             self._states = _CONTEXT.RawArray(_State, [(NO_CASE, 0.0, b"")] * self.count)
             begun = (self._states, _CONTEXT.Value("i", 0))
             self._pool = ProcessPoolExecutor(self.count, _CONTEXT, _start, begun)

@@ -83,6 +83,7 @@ def angle(
         from experiments.measurement import photographs
         from experiments.measurement.heap_files import heap_settings
 
+        pictures = photographs.expanded(pictures)
         _require_one_form({"--target": as_target, "--csv": as_csv, "--json": as_json})
         view, heaps = _view(crop, plate, heap_number, elevation, distance), heap_settings(unit, plate_height)
         options = photographs.PictureOptions(fit, view, heaps, by, keep_doubtful)

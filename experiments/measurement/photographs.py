@@ -88,6 +88,15 @@ def find_pictures(pattern: str, folder: Path, place: str, by: Grouping = "pictur
     return found
 
 
+def expanded(paths: Sequence[Path]) -> list[Path]:
+    """Return paths with the files for each pattern like ``photos/*.jpg`` that names no file itself, sorted.
+
+    Shells of Windows leave such patterns to the program, as all shells do between quotes.
+    """
+    found = ([path] if os.path.lexists(path) else sorted(map(Path, glob(str(path)))) for path in paths)
+    return [each for path, files in zip(paths, found, strict=True) for each in files or [path]]
+
+
 def require_separate(pictures: Sequence[Path], options: PictureOptions, place: str) -> None:
     """Refuse pictures of different heaps with the same content; raise `InputError` with both."""
     given = Duplicates()

@@ -3,6 +3,8 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -96,6 +98,15 @@ def test_a_process_that_is_lost_between_two_calls_is_replaced_and_others_are_lef
     assert other.is_alive()
     other.terminate()
     other.join()
+
+
+@pytest.mark.parametrize(("head", "said"), [("", "needs if __name__ == "), ("__name__\n", "")])
+def test_a_script_without_a_guard_is_ended_in_one_sentence(head: str, said: str, tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(f"{head}from dem_warp.processes import require_guard\nrequire_guard()\n")
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True)
+    assert (run.returncode, run.stderr.count("\n")) == ((1, 1) if said else (0, 0))
+    assert said in run.stderr
 
 
 def test_each_call_reports_its_own_progress() -> None:

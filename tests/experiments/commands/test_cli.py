@@ -98,6 +98,9 @@ def test_photographs_become_angles_and_overlays() -> None:
     code, out, _ = dem_warp("angle", "a.png", "b.png", "--json", "--overlay", "drawn")
     assert code == 0
     angles = [row["mean"] for row in json.loads(out)["pictures"]]
+    assert json.loads(dem_warp("angle", "[ab].png", "--json")[1])["pictures"] == [
+        row | {"overlay": None} for row in json.loads(out)["pictures"]
+    ]
     # The smooth-heap tolerance of `imaging` at this width.
     assert angles == pytest.approx(np.degrees(np.arctan([0.5, 0.3])), abs=0.3)
     assert sorted(path.name for path in Path("drawn").iterdir()) == ["a-angle.png", "b-angle.png"]
