@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from experiments.calibrate.values import UNLIMITED, reach_limits
 from experiments.io.errors import StudyError
 from experiments.studyfile import Study
+from experiments.studyfile.campaign import scenes_of
 
 Limits = Mapping[str, tuple[float, float]]
 
@@ -15,15 +16,18 @@ def check_calibration(study: Study) -> None:
     """Check that a study has factors and a target, and that the campaign's settings fit the factors.
 
     Raise StudyError when a setting names no factor, a fixed value leaves its limits, a step or half-range is
-    not positive, or the screening design is too small.
+    not positive, the screening design is too small, or a case has too many grains.
     """
+    reach = reach_limits(study)
+    for scene in scenes_of(study.target.fitted):
+        study.case({}, 0, scene)  # refuses too many grains, before the statistics load
     if not study.factors:
         raise StudyError(str(study.file), "needs at least one [[factor]] to be calibrated")
     settings, file = study.campaign, f"{study.file}: "
     hard: Limits = {factor.name: study.limits.get(factor.name, UNLIMITED) for factor in study.factors}
     for name in settings.selection.keep or ():
         _check_name(name, hard, f"{file}campaign.selection.keep")
-    _check_values(settings.climb.start, reach_limits(study), f"{file}campaign.climb.start")
+    _check_values(settings.climb.start, reach, f"{file}campaign.climb.start")
     _check_values(settings.surface.center, hard, f"{file}campaign.surface.center")
     _check_values(settings.optimum.point, hard, f"{file}campaign.optimum.point")
     _check_positive(settings.climb.step, hard, f"{file}campaign.climb.step")

@@ -33,7 +33,6 @@ from experiments.discover.mirror import odd_observables
 from experiments.io.errors import InputError, StudyError
 from experiments.io.texts import nearest_name
 from experiments.studyfile import Study
-from experiments.studyfile.manifest import describe
 from experiments.studyfile.mechanism_factor import MechanismFactor
 
 WITHOUT_EFFECT = (
@@ -86,7 +85,7 @@ class Search:
     @property
     def fingerprint(self) -> str:
         """Hash of all of the study that determines a heap at given factors."""
-        described = describe(self.study)
+        described = self.study.identity
         document = {key: value for key, value in described["study"].items() if key not in WITHOUT_EFFECT}
         if "condition" in document:  # the camera changes no heap
             conditions = document["condition"].items()

@@ -18,7 +18,6 @@ from experiments.studyfile.campaign import Response
 from experiments.studyfile.card import MATERIAL, SECTIONS
 from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
-from experiments.studyfile.manifest import study_hash
 from experiments.studyfile.solver_section import CORRECTED_FOR, LAWS, SolverSection, written
 
 CARD = "material.toml"
@@ -73,7 +72,7 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
         "outcome": campaign.outcome.value,
         "reason": campaign.reason,
         "scale": study.scale,
-        "study": study_hash(study),
+        "study": study.sha256,
         "estimator": f"repose angle, {measurement.fit!r} fit, mean of {measurement.azimuths} views",
         "measurement": measurement.settings,
         "numerics": numerics.model_dump(exclude_none=True),

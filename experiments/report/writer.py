@@ -21,7 +21,6 @@ from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
 from experiments.report.solid import SolidHeap
 from experiments.studyfile import Study
-from experiments.studyfile.manifest import study_hash
 
 LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "opencv-python-headless")
 """Packages whose version may change a number."""
@@ -42,7 +41,7 @@ def write_report(
     The provenance has the caller's facts about the run, nested; versions are added. Return the page.
     """
     folder = Path(out_dir)
-    made_by = {**(provenance or {}), "study": study_hash(study), "versions": library_versions()}
+    made_by = {**(provenance or {}), "study": study.sha256, "versions": library_versions()}
     page = render_page(campaign, study, pictures, made_by, solid)
     write_files(folder, study, page, {"campaign": campaign.to_dict()}, made_by, campaign.tables())
     write_material_card(campaign, study, folder)
@@ -62,7 +61,7 @@ def write_files(
         "name": study.name,
         "file": study.file.name,
         "scale": study.scale,
-        "sha256": study_hash(study),
+        "sha256": study.sha256,
         "document": study.document,
     }
     whole = {"study": about, **results, "provenance": jsonable(made_by)}

@@ -76,8 +76,8 @@ def run_campaign(run: Run, on_stage: StageHook | None = None) -> Campaign:
         "seconds": round(time.perf_counter() - started, 1),
         "engine": run.store.load(key).provenance if run.store.has(key) else {},
     }
-    pictures = heap_pictures(campaign, run.study, run.store.load)
-    solid = verified_heap(campaign, run.store.load)
     with run.publishing() as drafts:
+        pictures = heap_pictures(campaign, run.study, run.store.load)
+        solid = verified_heap(campaign, run.store.load)
         write_report(campaign, run.study, drafts, pictures, provenance, solid=solid)
     return campaign

@@ -14,6 +14,8 @@ from experiments.runs.request import RunRequest
 if TYPE_CHECKING:
     from experiments.cases import Resources
     from experiments.studyfile import Study
+    from experiments.studyfile.cluster_section import ClusterSection
+    from experiments.studyfile.target_section import TargetSection
 
 BENCH, PAPER = "bench", "paper"
 """Scales of a study where none is named: without a GPU, and with one."""
@@ -46,9 +48,11 @@ def prepare(
     """
     early = _read_early(study, request, check)
     resources = chosen_resources(request.device, request.workers, request.scheduler, request.cluster)
-    chosen = _at_scale(study, early, request, PAPER if resources.on_gpu else BENCH, check)
+    chosen = early
+    if chosen is None or study is None or isinstance(study, str | Path):
+        chosen = _at_scale(study, early, request, PAPER if resources.on_gpu else BENCH, check)
     folder = Path(request.out) if request.out is not None else default_folder(chosen, what)
-    return Prepared(chosen, resources_for(chosen, resources), folder, request)
+    return Prepared(chosen, resources_for(chosen.cluster, resources), folder, request)
 
 
 def _read_early(study: Study | str | Path | None, request: RunRequest, check: Check) -> Study | None:
@@ -72,12 +76,9 @@ def _read_early(study: Study | str | Path | None, request: RunRequest, check: Ch
 
 
 def _at_scale(
-    study: Study | str | Path | None, early: Study | None, request: RunRequest, suited: str, check: Check
+    path: str | Path | None, early: Study | None, request: RunRequest, suited: str, check: Check
 ) -> Study:
     """Return the study that was read early, or read it at the scale for the device."""
-    if early is not None and not isinstance(study, str | Path | None):
-        return early
-    path = study if isinstance(study, str | Path) else None
     scale = _scale(path, request.scale, suited)
     return early if early is not None and early.scale == scale else _read(path, scale, request, check)
 
@@ -121,8 +122,9 @@ def check_campaign(study: Study) -> Study:
     from experiments.measurement.measured_target import find_pictured
     from experiments.studyfile.campaign import TARGET_SCENE
 
-    if not find_pictured(study):
+    if not _names_pictures(study.target_section):
         return measured_study(study)
+    find_pictured(study)
     study.case({}, 0, TARGET_SCENE)
     return study
 
@@ -132,10 +134,13 @@ def with_pictures(prepared: Prepared) -> Prepared:
 
     Raise InputError when they cannot be used.
     """
-    from experiments.measurement.measured_target import find_pictured
-
     study = prepared.study
-    return replace(prepared, study=measured_study(study)) if find_pictured(study) else prepared
+    pictured = _names_pictures(study.target_section)
+    return replace(prepared, study=measured_study(study)) if pictured else prepared
+
+
+def _names_pictures(target: TargetSection | None) -> bool:
+    return target is not None and target.pictures is not None
 
 
 def measured_study(study: Study) -> Study:
@@ -143,16 +148,12 @@ def measured_study(study: Study) -> Study:
 
     Raise InputError when its pictures or its file cannot be used, or its decisions do not fit its factors.
     """
+    from experiments.calibrate.checks import check_calibration
     from experiments.measurement.measured_target import with_measurements
-    from experiments.studyfile.campaign import scenes_of
 
     study, notes = with_measurements(study)
     for note in notes:
         _log.warning("The measurements: %s", note)
-    for scene in scenes_of(study.target.fitted):
-        study.case({}, 0, scene)  # refuses too many grains, before the statistics load
-    from experiments.calibrate.checks import check_calibration
-
     check_calibration(study)
     return study
 
@@ -192,14 +193,14 @@ def chosen_resources(
     return resources
 
 
-def resources_for(study: Study, resources: Resources) -> Resources:
+def resources_for(cluster: ClusterSection | None, resources: Resources) -> Resources:
     """Take the workers of a study's own ``[cluster]`` where no cluster is asked for.
 
     A device that is named means this machine.
     """
-    if study.cluster is None or resources.is_cluster or resources.device is not None:
+    if cluster is None or resources.is_cluster or resources.device is not None:
         return resources
-    return replace(resources, cluster=study.cluster)
+    return replace(resources, cluster=cluster)
 
 
 def default_folder(study: Study, what: str = "") -> Path:

@@ -1,8 +1,7 @@
-"""The study of a folder of results: ``study.json``, its hash, and its differences from another study."""
+"""The study of a folder of results: ``study.json``, and its differences from another study."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -20,22 +19,9 @@ LARGEST = 10_000_000
 """Bytes of the largest file of this kind that is read."""
 
 
-def describe(study: Study) -> dict[str, Any]:
-    """Return all of a study that its results depend on, its clumps included, as JSON-able data."""
-    digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.files]
-    document = {key: value for key, value in study.document.items() if key != "cluster"}
-    return {"study": document, "scale": study.scale, "clump_sha256": digests}
-
-
-def study_hash(study: Study) -> str:
-    """Return the SHA-256 of what a study describes, which its outputs carry."""
-    text = json.dumps(describe(study), sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
 def write_manifest(folder: Path, study: Study) -> None:
     """Write the file with the study of the folder."""
-    write_text(folder / MANIFEST, json.dumps(describe(study), indent=1, allow_nan=False))
+    write_text(folder / MANIFEST, json.dumps(study.identity, indent=1, allow_nan=False))
 
 
 def differences(old: object, new: object, path: KeyPath = ()) -> Iterator[str]:

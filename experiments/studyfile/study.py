@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import copy
+import hashlib
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -124,6 +126,19 @@ class Study(Physics):
     def document(self) -> dict[str, Any]:
         """The study as written, the scale merged over it: plain JSON-able data, a copy to be read only."""
         return copy.deepcopy(self._document)
+
+    @cached_property
+    def identity(self) -> dict[str, Any]:
+        """All of the study that its results depend on, its clumps included, as JSON-able data."""
+        digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in self.grain.files]
+        document = {key: value for key, value in self.document.items() if key != "cluster"}
+        return {"study": document, "scale": self.scale, "clump_sha256": digests}
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of the study's identity, which its outputs carry."""
+        text = json.dumps(self.identity, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()
 
     @cached_property
     def target(self) -> Target:

@@ -28,7 +28,6 @@ from experiments.measurement.case_observables import Observed, observe
 from experiments.measurement.filling import filling_reached
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
-from experiments.studyfile.manifest import study_hash
 from experiments.studyfile.observables import observables_of
 from imaging import HeapAngle, PictureError, Snapshot, overlay, save_picture, snapshot
 
@@ -96,7 +95,7 @@ class Heap:
             "observables": self.observed.observables,
             "observable_units": self.units,
             "filling": self.filling,
-            "provenance": {**with_version(self.result.provenance), "study": study_hash(self.study)},
+            "provenance": {**with_version(self.result.provenance), "study": self.study.sha256},
         }
 
 

@@ -12,7 +12,7 @@ from experiments.cases.store.store import Store
 from experiments.io.errors import StoreError
 from experiments.io.files import JOURNAL, LOCK, has_temporary_name
 from experiments.studyfile import Study
-from experiments.studyfile.manifest import describe, differences, read_manifest, write_manifest
+from experiments.studyfile.manifest import differences, read_manifest, write_manifest
 
 CASES = "cases"
 """Folder of the stored cases."""
@@ -44,7 +44,7 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
     require_usable(folder, resume)
     changes: list[str] = []
     if resume:
-        changes = list(differences(read_manifest(folder), describe(study)))
+        changes = list(differences(read_manifest(folder), study.identity))
         for name in changed_outputs(folder):
             _require_file(folder / name, "an output")
             said = "%s has changed since the earlier run and will be overwritten"

@@ -20,7 +20,7 @@ from dem_warp.provenance import engine_fingerprint
 from experiments.io.errors import StoreError
 from experiments.io.files import read_file, write_text
 from experiments.studyfile import Study
-from experiments.studyfile.manifest import LARGEST, study_hash, write_manifest
+from experiments.studyfile.manifest import LARGEST, write_manifest
 
 LIST = "files.json"
 """File with the hash of every output, and with what all of them were made from."""
@@ -50,9 +50,9 @@ def publishing(
     shutil.rmtree(drafts, ignore_errors=True)
     drafts.mkdir(parents=True)
     try:
-        yield drafts
         write_manifest(drafts, study)
-        made = {"study": study_hash(study), "engine": engine_fingerprint(), **made_from}
+        made = {"study": study.sha256, "engine": engine_fingerprint(), **made_from}
+        yield drafts
         _publish(drafts, folder, made, lasting or {})
     finally:
         shutil.rmtree(drafts, ignore_errors=True)

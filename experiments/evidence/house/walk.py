@@ -76,5 +76,5 @@ def walk() -> list[Count]:
     climbs = sum(floor.get(above, 0) > floor.get(below, 0) for below, above in changes)
     return [
         Count("calibrate to the engine, changes of room", len(changes), 45),
-        Count("calibrate to the engine, climbs", climbs, 19),
+        Count("calibrate to the engine, climbs", climbs, 12),
     ]

@@ -19,7 +19,6 @@ from experiments.report.pictures import HeapPicture
 from experiments.report.solid import SolidHeap
 from experiments.report.writer import PAGE, library_versions, write_files
 from experiments.studyfile import Study
-from experiments.studyfile.manifest import study_hash
 
 
 def write_discovery(
@@ -37,7 +36,7 @@ def write_discovery(
 
     The provenance has the caller's facts about the run, nested; versions are added. Return the page.
     """
-    made_by = {**(provenance or {}), "study": study_hash(study), "versions": library_versions()}
+    made_by = {**(provenance or {}), "study": study.sha256, "versions": library_versions()}
     files = [path.name for path in write_study_files(found, study, terms, folder)]
     page = render_discovery(found, study, terms, settings, pictures, files, made_by, further, solid)
     results = results_of(found, terms) | {"settings": asdict(settings)}

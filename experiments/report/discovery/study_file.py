@@ -19,7 +19,6 @@ from experiments.report.clump_files import gather_clumps
 from experiments.report.discovery.discovery_verdict import tied
 from experiments.report.discovery.terms import Terms
 from experiments.studyfile import Study
-from experiments.studyfile.manifest import study_hash
 from experiments.studyfile.mechanism_factor import MechanismFactor, with_mechanisms
 
 HEAD = """\
@@ -50,7 +49,7 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
         path = folder / f"study-with-{'-and-'.join(name for name, _ in candidate)}.toml"
         title = terms.titles(name for name, _ in candidate)
         head = HEAD.format(
-            name=safe_text(study.name), title=safe_text(title), file=path.name, study=study_hash(study)
+            name=safe_text(study.name), title=safe_text(title), file=path.name, study=study.sha256
         )
         write_text(path, head + toml_text(document))
         written.append(path)

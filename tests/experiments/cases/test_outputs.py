@@ -11,7 +11,6 @@ from experiments.cases.store.outputs import DRAFTS, LIST, changed_outputs, publi
 from experiments.io.errors import StoreError
 from experiments.runs.run_folder import locked
 from experiments.studyfile import Study, load_study
-from experiments.studyfile.manifest import study_hash
 
 WriteStudy = Callable[..., Path]
 
@@ -32,7 +31,7 @@ def publish(folder: Path, study: Study, *names: str, **made_from: object) -> Non
     with publishing(folder, study, **made_from) as drafts:
         for name in names:
             (drafts / name).parent.mkdir(parents=True, exist_ok=True)
-            (drafts / name).write_text(study_hash(study), encoding="utf-8")
+            (drafts / name).write_text(study.sha256, encoding="utf-8")
 
 
 def listed(folder: Path) -> dict:
@@ -47,7 +46,7 @@ def test_every_output_is_listed_with_its_hash_and_its_study(folder: Path, small_
     publish(folder, small_study, "report.html", "tables/cases.csv")
     assert files_of(folder) == {LIST, "report.html", "study.json", "tables/cases.csv"}
     found = listed(folder)
-    assert found["made_from"]["study"] == study_hash(small_study)
+    assert found["made_from"]["study"] == small_study.sha256
     assert found["files"] == {name: sha256_of(folder / name) for name in files_of(folder) - {LIST}}
 
 
@@ -59,7 +58,7 @@ def test_outputs_of_another_study_are_removed_and_other_files_stay(
     publish(folder, other, "report.html")
     assert files_of(folder) == {LIST, "notes.txt", "report.html", "study.json"}
     assert not (folder / "old").exists()
-    assert (folder / "report.html").read_text(encoding="utf-8") == study_hash(other)
+    assert (folder / "report.html").read_text(encoding="utf-8") == other.sha256
 
 
 def test_outputs_of_the_same_study_stay_with_new_ones(folder: Path, small_study: Study) -> None:

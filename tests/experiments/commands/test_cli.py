@@ -14,7 +14,6 @@ from experiments.cli import app
 from experiments.commands.console import CaseProgress, describe_progress, duration
 from experiments.runs import calibration as run
 from experiments.studyfile import load_study
-from experiments.studyfile.manifest import study_hash
 from imaging import save_picture
 
 WriteStudy = Callable[..., Path]
@@ -63,7 +62,7 @@ def test_a_small_real_heap_is_simulated_and_written(write_study: WriteStudy) -> 
     heap = json.loads(out)
     assert heap == json.loads(Path("one/angle.json").read_text(encoding="utf-8"))
     assert (heap["settings"], heap["seed"], heap["status"]) == ({"E": 0.5}, 3, "finished")
-    assert heap["provenance"]["study"] == study_hash(load_study(path))
+    assert heap["provenance"]["study"] == load_study(path).sha256
     assert heap["observables"]["grain_count"] == 30
     views = [0.5 * (view["left"] + view["right"]) for view in heap["views"]]
     assert heap["angle"]["mean"] == pytest.approx(np.mean(views), rel=1e-12)

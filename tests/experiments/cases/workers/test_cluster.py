@@ -177,16 +177,15 @@ def test_a_wrong_profile_is_refused_with_its_place(tmp_path: Path, text: str, sa
 
 def test_a_study_may_name_its_cluster_and_its_hash_stays(write_study: Callable[..., Path]) -> None:
     from experiments.runs.choices import chosen_resources, resources_for
-    from experiments.studyfile.manifest import study_hash
 
     plain = load_study(write_study())
-    before = study_hash(plain)
+    before = plain.sha256
     study = load_study(write_study(add='\n[cluster]\nkind = "slurm"\nworkers = 4\n'))
-    assert study_hash(study) == before
-    asked = resources_for(study, chosen_resources())
+    assert study.sha256 == before
+    asked = resources_for(study.cluster, chosen_resources())
     assert (asked.count, asked.submits_jobs, str(asked)) == (4, True, "4 workers of slurm")
-    assert resources_for(study, chosen_resources("cpu")).cluster is None
-    assert resources_for(plain, chosen_resources()).cluster is None
+    assert resources_for(study.cluster, chosen_resources("cpu")).cluster is None
+    assert resources_for(plain.cluster, chosen_resources()).cluster is None
 
 
 def test_more_processes_than_the_cores_serve_are_refused(
