@@ -48,11 +48,11 @@ def prepare(
     """
     early = _read_early(study, request, check)
     resources = chosen_resources(request.device, request.workers, request.scheduler, request.cluster)
-    chosen = early
-    if chosen is None or study is None or isinstance(study, str | Path):
-        chosen = _at_scale(study, early, request, PAPER if resources.on_gpu else BENCH, check)
-    folder = Path(request.out) if request.out is not None else default_folder(chosen, what)
-    return Prepared(chosen, resources_for(chosen.cluster, resources), folder, request)
+    path = study if isinstance(study, str | Path) else None
+    if early is None or study is path:
+        early = _at_scale(path, early, request, PAPER if resources.on_gpu else BENCH, check)
+    folder = Path(request.out) if request.out is not None else default_folder(early, what)
+    return Prepared(early, resources_for(early.cluster, resources), folder, request)
 
 
 def _read_early(study: Study | str | Path | None, request: RunRequest, check: Check) -> Study | None:

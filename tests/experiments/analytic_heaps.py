@@ -89,6 +89,9 @@ class StandInStudy:
     def limits(self) -> dict[str, tuple[float, float]]:
         return {factor.name: (self.least, np.inf) for factor in self.factors}
 
+    def case(self, *_: object) -> None:
+        """Accept any settings."""
+
 
 def settings(**sections: Mapping) -> CampaignSettings:
     """Return the decisions of a campaign."""
