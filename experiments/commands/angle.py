@@ -27,7 +27,7 @@ def angle(
         typer.Argument(
             metavar="PICTURE...",
             help="Photographs of heaps; or heaps of LIGGGHTS, LAMMPS, Yade and others: text dumps (the last "
-            "frame), tables of spheres, VTK files.",
+            "frame), tables of spheres, VTK, extended XYZ, NumPy and MercuryDPM files; gzip is read.",
         ),
     ],
     fit: Annotated[str, typer.Option(help="Part of the flanks: flank, middle, lower or upper.")] = "flank",

@@ -17,6 +17,7 @@ import numpy as np
 from scipy import special
 
 from doe import Sample
+from experiments.grains.spheres import require_known
 from experiments.io.errors import InputError
 from experiments.io.files import replacing
 from experiments.measurement.duplicates import Duplicates
@@ -147,6 +148,7 @@ def _measured_row(picture: Path, options: PictureOptions, copy: Path | None) -> 
             row |= values_of(heap, LEVEL)
             draw: Callable[[], tuple[Picture, ...]] = heap.pictures
         else:
+            require_known(picture)
             angle = measure_photograph(picture, options.fit, options.view)
             row |= _values(angle)
             draw = partial(_drawn_photograph, picture, angle)

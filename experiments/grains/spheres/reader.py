@@ -1,11 +1,20 @@
-"""Reading of a file of spheres in any format."""
+"""Reading of a file of spheres in any format, compressed by gzip or not."""
 
 from __future__ import annotations
 
+import gzip
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import IO, cast
 
 from experiments.grains.spheres.column_table import TABLE
+from experiments.grains.spheres.frame_tables import MERCURY, XYZ
 from experiments.grains.spheres.lammps_dump import DUMP
+from experiments.grains.spheres.numpy_file import NUMPY
 from experiments.grains.spheres.plain_lines import PLAIN
 from experiments.grains.spheres.sphere_file import LARGEST, Format, SphereFile
 from experiments.grains.spheres.vtk_file import VTK
@@ -15,35 +24,97 @@ from experiments.io.errors import InputError
 from experiments.io.files import check_file
 from experiments.io.texts import decoded
 
-FORMATS: tuple[Format, ...] = (DUMP, VTK, YADE_TEXT, YADE_TEMPLATE, XML, PLAIN, TABLE)
+FORMATS: tuple[Format, ...] = (DUMP, VTK, NUMPY, YADE_TEXT, YADE_TEMPLATE, XML, XYZ, MERCURY, PLAIN, TABLE)
 """Formats in order; the first that recognises a file reads it."""
 HEAD = 65536
 """Number of first bytes of a file that show its format."""
+GZIP = b"\x1f\x8b"
+"""First bytes of a file that is compressed by gzip."""
+
+_VIDEO = ("a video", "Save one frame as PNG or JPEG.")
+OTHERS = {
+    "LAMMPSCUSTOM": ("a binary dump of LAMMPS", "Write a text dump: a name that does not end in .bin."),
+    "DUMPCUSTOM": ("a binary dump of LAMMPS", "Write a text dump: a name that does not end in .bin."),
+    "\x89HDF": ("an HDF5 file", "Export centres and radii as VTK or CSV."),
+    "CDF": ("a NetCDF file", "Export centres and radii as VTK or CSV."),
+    "%PDF": ("a PDF", "Save its picture as PNG or JPEG."),
+    "PK\x03\x04": (
+        "a ZIP archive or an Office document",
+        "Take the file out of it, or save the sheet as CSV.",
+    ),
+    "ftypisom": _VIDEO,
+    "ftypmp4": _VIDEO,
+    "ftypqt": _VIDEO,
+    "AVI LIST": _VIDEO,
+    "\x1aE\xdf\xa3": _VIDEO,
+}
+"""Names of other formats, with a hint, by a mark in their first 32 bytes."""
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[IO[bytes]]:
+    """Open a file, or what gzip has compressed in it."""
+    try:
+        check_file(path, LARGEST)
+        with path.open("rb") as file:
+            packed = file.peek(len(GZIP)).startswith(GZIP)
+            yield cast(IO[bytes], gzip.GzipFile(fileobj=file)) if packed else file
+    except (OSError, EOFError, zlib.error) as error:
+        problem = getattr(error, "strerror", None) or str(error)
+        raise InputError(str(path), f"cannot be read: {problem}") from None
+
+
+def head_of(path: Path) -> str:
+    """Return the first bytes of a file, decompressed, as text of Latin-1; where they are cut, whole lines."""
+    with _opened(path) as file:
+        data = file.read(HEAD)
+    head = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
+    # A format needs complete lines.
+    return head if len(data) < HEAD else head.rpartition("\n")[0]
 
 
 def format_of(path: Path) -> Format | None:
     """Find the format of a file by its content; None if it has none of `FORMATS`."""
-    try:
-        check_file(path, LARGEST)
-        with path.open("rb") as file:
-            data = file.read(HEAD)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
-    head = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
-    binary_vtk = head.startswith("# vtk DataFile") or "<VTKFile" in head[:4096]
-    if "\0" in head and not binary_vtk:
-        return None
-    # A format needs complete lines.
-    whole = head if len(data) < HEAD else head.rpartition("\n")[0]
-    return next((each for each in FORMATS if each.recognises(whole)), None)
+    head = head_of(path)
+    known = [NUMPY] if "\0" in head else FORMATS
+    if head.startswith("# vtk DataFile") or "<VTKFile" in head[:4096]:
+        known = [VTK]
+    return next((each for each in known if each.recognises(head)), None)
+
+
+def require_known(path: Path) -> None:
+    """Raise InputError with the name of a format that is neither a picture's nor one of `FORMATS`."""
+    start = head_of(path)[:32] if path.is_file() else ""
+    for mark, (name, hint) in OTHERS.items():
+        if mark in start:
+            raise InputError(str(path), f"is {name}, neither a picture nor a file of spheres", hint=hint)
 
 
 def read_spheres(path: Path) -> SphereFile:
-    """Read a file of spheres in the format of its content."""
+    """Read a file of spheres in the format of its content, which gzip may have compressed."""
     found = format_of(path)
-    if found is not None:
-        return found.read(path)
-    with path.open("rb") as file:
-        decoded(file.read(HEAD), str(path))
-    known = "; ".join(each.name for each in FORMATS)
-    raise InputError(str(path), f"not a file of spheres ({known})")
+    if found is None:
+        require_known(path)
+        with _opened(path) as file:
+            decoded(file.read(HEAD), str(path))
+        known = "; ".join(each.name for each in FORMATS)
+        raise InputError(str(path), f"not a file of spheres ({known})")
+    with _opened(path) as file:
+        if not isinstance(file, gzip.GzipFile):
+            return found.read(path)
+        return _read_copy(file, path, found)
+
+
+def _read_copy(packed: IO[bytes], path: Path, found: Format) -> SphereFile:
+    with TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name.removesuffix(".gz")
+        content = packed.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise InputError(str(path), f"must have at most {LARGEST:,} bytes when decompressed")
+        copy.write_bytes(content)
+        try:
+            return found.read(copy)
+        except InputError as error:
+            raise InputError.of(
+                replace(each, place=each.place.replace(str(copy), str(path))) for each in error.problems
+            ) from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,10 @@ from experiments.io.errors import InputError
 RADII, DIAMETERS = ("radius", "radii", "r"), ("diameter",)
 BODIES = ("grain", "id_multisphere", "clumpid", "clump_id", "mol")
 """Names of arrays, in lower case."""
-_ENDINGS = {"PolyData": ".vtp", "UnstructuredGrid": ".vtu"}
+_ENDINGS = {
+    "PolyData": ".vtp", "UnstructuredGrid": ".vtu",
+    "PPolyData": ".pvtp", "PUnstructuredGrid": ".pvtu", "Collection": ".pvd",
+}  # fmt: skip
 
 
 def _read(path: Path) -> SphereFile:
@@ -23,7 +27,7 @@ def _read(path: Path) -> SphereFile:
     ending = _ending(path)
     try:
         with pyvista.vtk_verbosity("off"):
-            grid = pyvista.get_reader(str(path), force_ext=ending).read()
+            grid = _last_grid(pyvista.get_reader(str(path), force_ext=ending))
             points, arrays = np.asarray(grid.points), {n.lower(): n for n in grid.point_data}
             values = {low: np.asarray(grid.point_data[name]) for low, name in arrays.items()}
     except Exception as error:  # VTK's readers raise any class
@@ -40,6 +44,15 @@ def _read(path: Path) -> SphereFile:
     body = next((name for name in BODIES if name in values), None)
     bodies = None if body is None else own_bodies(values[body].astype(np.float64))
     return SphereFile(f"VTK file, radii from the array {arrays[size]}", spheres, bodies)
+
+
+def _last_grid(reader: Any) -> Any:
+    """Read a grid; of a collection of times the last one, all of its parts."""
+    times = getattr(reader, "number_time_points", 0)
+    if times:
+        reader.set_active_time_point(times - 1)
+    grid = reader.read()
+    return grid.combine() if hasattr(grid, "combine") else grid
 
 
 def _ending(path: Path) -> str:

@@ -1,0 +1,44 @@
+"""Archives of NumPy: arrays of centres and radii, or one table x y z r."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from experiments.grains.spheres.sphere_file import Columns, Format, SphereFile, spheres_of
+from experiments.io.errors import InputError
+
+CENTERS, RADII = ("centers", "centres", "position", "positions", "xyz"), ("radius", "radii", "r")
+"""Names of arrays."""
+
+
+def _read(path: Path) -> SphereFile:
+    try:
+        loaded = np.load(path)  # objects are refused: they could run code
+        arrays = (
+            {name.lower(): loaded[name] for name in loaded.files}
+            if hasattr(loaded, "files")
+            else {"": loaded}
+        )
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(str(path), f"NumPy cannot read the file: {error}") from None
+    centers, radii = (next((arrays[n] for n in names if n in arrays), None) for names in (CENTERS, RADII))
+    if centers is not None and radii is not None and len(centers) == len(radii):
+        table = np.column_stack([centers, radii])
+    else:
+        table = arrays.get("", np.empty(0))
+    if table.ndim != 2 or table.shape[1] != 4 or table.dtype.kind not in "fiu":
+        shapes = ", ".join(f"{name} {array.shape}".strip() for name, array in arrays.items())
+        raise InputError(
+            str(path), f"needs arrays {CENTERS[0]} (n, 3) and {RADII[0]} (n), or one table (n, 4)", shapes
+        )
+    rows = ((n, [repr(float(value)) for value in row]) for n, row in enumerate(table))
+    return SphereFile("NumPy file", spheres_of(rows, Columns(0, 1, 2, 3), path, kind="row")[0])
+
+
+NUMPY = Format(
+    "NumPy file (npz, npy)",
+    lambda head: head.startswith("\x93NUMPY") or (head.startswith("PK\x03\x04") and ".npy" in head[:200]),
+    _read,
+)
