@@ -6,36 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from worlds import (
-    BALL,
-    BOOT,
-    GRAIN,
-    PYRAMID,
-    SMALL_TUBE,
-    STEEL,
-    ball_case,
-    grains,
-    pair,
-    small_case,
-    solve,
-    world,
-)
+import worlds
+from worlds import BALL, BOOT, GRAIN, PYRAMID, SMALL_TUBE, STEEL, ball_case, grains, pair, small_case, solve
 
-from dem_warp import (
-    Case,
-    DrawDown,
-    Drum,
-    GrainPopulation,
-    Interaction,
-    LiftedCylinder,
-    Material,
-    Numerics,
-    ShapeMixture,
-    SizeClasses,
-    WallPart,
-    simulate,
-    simulate_frames,
-)
+import dem_warp
+from dem_warp import Case, DrawDown, Drum, GrainPopulation, Interaction, Material, ShapeMixture, SizeClasses
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.clump_fitting import fit_clump
 from dem_warp.clumps import ClumpShape
@@ -57,23 +32,26 @@ CASE, SPHERE = small_case(), parse_solid("sphere:4")
 DRUM = Drum(0.05, 0.018, STEEL, 1.0)
 BOXES = DrawDown(0.08, 0.0165, 0.03, 0.028, 0.045, STEEL)
 PAIR = grains([ORIGIN, (0.1, 0.0, 0.0)])
-WORLD = world(PAIR, pair(), 1e-5)
+WORLD = worlds.world(PAIR, pair(), 1e-5)
 WITH_A_MESH = replace(WORLD, walls=((Mesh([ORIGIN, UP, (1.0, 0.0, 0.0)], [[0, 1, 2]]), 1), (Plane(), 1)))
 ONE_SPHERE, CORNERS = np.zeros((1, 3)), np.vstack([np.zeros(3), np.eye(3)])
 
 
 def with_parts(*names: str) -> Case:
-    parts = tuple(WallPart(name, STEEL, Interaction(0.5, 0.5, 0.0)) for name in names)
+    parts = tuple(dem_warp.WallPart(name, STEEL, Interaction(0.5, 0.5, 0.0)) for name in names)
     return replace(ball_case(DRUM, 0.5), wall_parts=parts)
 
 
 CASES = [
-    (lambda: Numerics(precision="half"), "precision: must be one of mixed, double, got 'half'"),
+    (lambda: dem_warp.Numerics(precision="half"), "precision: must be one of mixed, double, got 'half'"),
     (lambda: replace(CASE, seed=-1), "Case.seed: must be an integer from 0 .* got -1"),
-    (lambda: simulate([CASE], device="gpu"), "device: must be one of .*cpu.*, got 'gpu'"),
-    (lambda: simulate_frames(CASE, 1, "cpu"), "simulate_frames.count: must be 2 or more, got 1"),
+    (lambda: dem_warp.simulate([CASE], device="gpu"), "device: must be one of .*cpu.*, got 'gpu'"),
+    (lambda: dem_warp.simulate_frames(CASE, 1, "cpu"), "simulate_frames.count: must be 2 or more, got 1"),
     (lambda: Checkpoints(Path("none"), -1.0), r"Checkpoints.every: must be 0 or more \[s\], got -1"),
-    (lambda: LiftedCylinder(-0.03, 0.1, STEEL), "LiftedCylinder.diameter: must be positive.* got -0.03"),
+    (
+        lambda: dem_warp.LiftedCylinder(-0.03, 0.1, STEEL),
+        "LiftedCylinder.diameter: must be positive.* got -0.03",
+    ),
     (lambda: replace(SMALL_TUBE, plate_diameter=0.01), "plate_diameter: must be above the tube's .* 0.01"),
     (lambda: replace(BOXES, slot=0.08), r"DrawDown.slot: must be below the width 0.08 \[m\], got 0.08"),
     (lambda: replace(DRUM, filling=0.9), "Drum.filling: must be at most 0.8, got 0.9"),

@@ -12,17 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from worlds import (
-    DEVICE,
-    SMALL_TUBE,
-    assert_same_bits,
-    assert_same_result,
-    finish,
-    pile,
-    small_case,
-    solve,
-    state,
-)
+import worlds
+from worlds import DEVICE, SMALL_TUBE, assert_same_bits, assert_same_result, pile, small_case, solve, state
 
 import dem_warp.batch
 import dem_warp.checkpoint
@@ -66,7 +57,7 @@ def handful(seed: int) -> Case:
 def alone() -> tuple[CaseResult, dict[str, np.ndarray]]:
     """Return result and final state of the small case by itself and never interrupted."""
     batch = start(small_case())
-    return finish(batch)[0], state(batch.solver)
+    return worlds.finish(batch)[0], state(batch.solver)
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +102,7 @@ def test_a_case_that_was_left_in_any_phase_ends_in_the_same_bits(alone, left, ph
     batch = start(small_case(), folder=left[phase])
     assert batch.steps[0] > 0
     assert batch.phase(0) == phase
-    assert_same_result(finish(batch)[0], alone[0])
+    assert_same_result(worlds.finish(batch)[0], alone[0])
     assert_same_bits(state(batch.solver), alone[1])
 
 

@@ -8,27 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import worlds
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from worlds import (
-    BALL,
-    GRAVITY,
-    RADIUS,
-    STEEL,
-    TIME_STEP,
-    Impact,
-    assert_same_bits,
-    ball_mass,
-    grains,
-    pair,
-    pile,
-    record,
-    run_for,
-    small_case,
-    solve,
-    state,
-    world,
-)
+from worlds import GRAVITY, RADIUS, TIME_STEP, ball_mass, grains, pair, record, run_for, solve, state, world
 
 from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.jkr import JKR
@@ -91,7 +74,7 @@ def drive(
     walls = () if partner else (Plane(),)
     seen = record(solve(world(bodies, contact, dt, walls=walls)), steps)
     height = seen.positions[:-1, 0, 2] - (seen.positions[:-1, 1, 2] if partner else 0.0)
-    return touching - height, density * BALL.volume * np.diff(seen.velocities[:, 0, 2]) / dt
+    return touching - height, density * worlds.BALL.volume * np.diff(seen.velocities[:, 0, 2]) / dt
 
 
 # Forces of up to 0.2 N, read from the kicks to 0.5 kg in steps of 1e-6 s or more: its speed of 0.01 m/s is
@@ -221,7 +204,7 @@ def test_a_grain_hangs_by_wall_adhesion_up_to_its_largest_pull():
 
 
 def test_a_ceiling_that_adheres_holds_a_grain_that_does_not_stick_to_another():
-    contacts = replace(small_case(modulus_scale=1.0), mechanisms=only(ADHESION)).contacts(STEEL)
+    contacts = replace(worlds.small_case(modulus_scale=1.0), mechanisms=only(ADHESION)).contacts(worlds.STEEL)
     k, modulus = ADHESION.wall_adhesion_energy_density, contacts[1].modulus
     deepest = RADIUS * (1.5 * math.pi * k / modulus) ** 2
     bodies = grains([[0.0, 0.0, deepest - RADIUS], [0.0, 0.0, deepest - 3.0 * RADIUS + 1e-7]])
@@ -242,7 +225,7 @@ def test_jkr_takes_the_work_of_separation_from_an_impact():
     slowest = math.sqrt(2.0 * cost / mass)
     speeds = slowest * np.array([0.5, 0.95, 1.05, 1.2, 2.0])
     contact, steps = sticking(STICKY), 2000
-    step = Impact.of(contact, RADIUS / 2.0, mass, speeds.min()).duration / steps
+    step = worlds.Impact.of(contact, RADIUS / 2.0, mass, speeds.min()).duration / steps
     places = [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0 * RADIUS + 1e-9]]
     meet = [grains(places, velocities=[[0.0, 0.0, v], [0.0, 0.0, 0.0]]) for v in speeds]
     seen = record(solve(*(world(balls, contact, step) for balls in meet)), 3 * steps)
@@ -268,7 +251,7 @@ DAMP = (
 def damp_pile(skin: float, seed: int = 1) -> WorldSetup:
     """Return nine-sphere grains that fall and stick; their bridges reach 0.2 mm."""
     contact = pair(restitution=0.3, friction=0.5, rolling=0.05, mechanisms=only(*DAMP))
-    return replace(pile(seed, 16, skin), contacts=(contact, contact))
+    return replace(worlds.pile(seed, 16, skin), contacts=(contact, contact))
 
 
 def test_bonds_outlast_rebuilds_in_any_batch():
@@ -280,4 +263,4 @@ def test_bonds_outlast_rebuilds_in_any_batch():
         assert not solver.flags.numpy().any()
     # The thin skin is used up again and again (measured: 39 and 805 rebuilds).
     assert often.rebuilds.numpy()[1] > 10 * seldom.rebuilds.numpy()[0]
-    assert_same_bits(state(often, 1), state(seldom))
+    worlds.assert_same_bits(state(often, 1), state(seldom))

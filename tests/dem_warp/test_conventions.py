@@ -8,19 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import warp as wp
-from worlds import (
-    RADIUS,
-    Impact,
-    Record,
-    ball_mass,
-    grains,
-    pair,
-    record,
-    small_case,
-    solve,
-    static_overlap,
-    world,
-)
+import worlds
+from worlds import RADIUS, Impact, Record, ball_mass, grains, pair, record, small_case, solve, world
 
 from dem_warp.laws.contact_law import contact_law, memory_size
 from dem_warp.laws.conventions import BASE_FORMS, EDEM, PRESETS, RELATIVE, ContactLaws, laws_named
@@ -142,7 +131,9 @@ def test_tangential_dampings_are_those_of_their_codes():
 def test_the_overlap_circle_has_twice_hertz_s_area():
     hertz, circle = pair(), pair(laws=ContactLaws(normal="overlap_circle"))
     # F = 4/3 E* a d with a = sqrt(2 R* d) in place of sqrt(R* d)
-    assert static_overlap(circle, 1.0) == pytest.approx(static_overlap(hertz, 1.0) * 2.0 ** (-1.0 / 3.0))
+    assert worlds.static_overlap(circle, 1.0) == pytest.approx(
+        worlds.static_overlap(hertz, 1.0) * 2.0 ** (-1.0 / 3.0)
+    )
     assert circle.shear_modulus / hertz.shear_modulus == pytest.approx(math.sqrt(2.0))
 
 

@@ -4,25 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import (
-    DEVICE,
-    GRAVITY,
-    RADIUS,
-    SMALL_TUBE,
-    assert_same_bits,
-    assert_same_result,
-    ball_mass,
-    ball_on_plane,
-    grains,
-    pair,
-    pile,
-    record,
-    run_for,
-    small_case,
-    solve,
-    static_overlap,
-    world,
-)  # fmt: skip
+import worlds
+from worlds import DEVICE, GRAVITY, RADIUS, SMALL_TUBE, ball_mass, ball_on_plane, pair, small_case, solve
 
 from dem_warp import CaseResult, Film, simulate, simulate_frames
 from dem_warp.contact_forces import NO_GRAIN, NO_WALL, ForceProbe
@@ -42,7 +25,7 @@ def filmed() -> tuple[CaseResult, Film]:
 
 def test_frames_do_not_change_a_bit(filmed: tuple[CaseResult, Film]) -> None:
     [alone] = simulate([CLUMPS], DEVICE, workers=1)
-    assert_same_result(alone, filmed[0])
+    worlds.assert_same_result(alone, filmed[0])
 
 
 def test_a_probe_leaves_no_trace_in_contacts_with_a_memory() -> None:
@@ -52,22 +35,22 @@ def test_a_probe_leaves_no_trace_in_contacts_with_a_memory() -> None:
     assert solver.neighbours.memory.numpy().any()
     before = take_snapshot(solver, 0)
     assert len(ForceProbe(solver).forces(0)) > 0
-    assert_same_bits(before, take_snapshot(solver, 0))
+    worlds.assert_same_bits(before, take_snapshot(solver, 0))
     assert not solver.neighbours.reactions.force.numpy().any()
     assert not solver.neighbours.reactions.torque.numpy().any()
 
 
 def test_contact_forces_accelerate_the_grains() -> None:
-    setup = pile(count=12)
+    setup = worlds.pile(count=12)
     solver = solve(setup)
-    run_for(solver, 0.03)
+    worlds.run_for(solver, 0.03)
     contacts = ForceProbe(solver).forces(0)
     net = np.zeros((setup.grains.count, 3))
     np.add.at(net, contacts.grains, contacts.forces)
     between = contacts.partners != NO_GRAIN
     np.add.at(net, contacts.partners[between], -contacts.forces[between])
     assert 0 < between.sum() < len(contacts)
-    before, after = record(solver, 1).velocities
+    before, after = worlds.record(solver, 1).velocities
     gained = (after - before) / setup.time_step - np.array(setup.gravity)
     # A velocity of up to 1 m/s is kept in double precision, 1e-16, and a step lasts 5e-6 s.
     np.testing.assert_allclose(net / setup.masses[:, None], gained, rtol=1e-9, atol=1e-9)
@@ -81,15 +64,15 @@ def test_a_ball_at_rest_puts_its_weight_on_the_plane_below_it() -> None:
     np.testing.assert_allclose(found.forces, [[0.0, 0.0, weight]], rtol=1e-12, atol=1e-12 * weight)
     np.testing.assert_allclose(found.normals, [[0.0, 0.0, 1.0]])
     # The surfaces meet half way into each other.
-    overlap = static_overlap(contact, weight)
+    overlap = worlds.static_overlap(contact, weight)
     np.testing.assert_allclose(found.points, [[0.0, 0.0, -0.5 * overlap]], atol=1e-12)
 
 
 def test_two_balls_press_on_each_other_once() -> None:
     overlap = 1e-4
-    bodies = grains([[0.0, 0.0, 0.0], [0.0, 2.0 * RADIUS - overlap, 0.0]])
+    bodies = worlds.grains([[0.0, 0.0, 0.0], [0.0, 2.0 * RADIUS - overlap, 0.0]])
     contact = pair()
-    found = ForceProbe(solve(world(bodies, contact, 1e-6))).forces(0)
+    found = ForceProbe(solve(worlds.world(bodies, contact, 1e-6))).forces(0)
     assert (found.grains, found.partners, found.walls) == ([0], [1], [NO_WALL])
     # Hertz, with half a ball's radius.
     force = 4.0 / 3.0 * contact.modulus * np.sqrt(RADIUS / 2.0) * overlap**1.5

@@ -4,24 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from worlds import (
-    GRAIN,
-    GRAVITY,
-    PYRAMID,
-    RADIUS,
-    TIME_STEP,
-    ball_mass,
-    ball_on_plane,
-    downhill,
-    grains,
-    pair,
-    record,
-    run_for,
-    solve,
-    state,
-    static_overlap,
-    world,
-)
+import worlds
+from worlds import GRAVITY, PYRAMID, RADIUS, TIME_STEP, ball_mass, ball_on_plane, pair, run_for, solve, state
 
 from dem_warp.laws.conventions import ContactLaws
 from dem_warp.laws.kinetic_friction import KineticFriction
@@ -37,7 +21,7 @@ SPEED = 0.1
 
 def lever(contact: ContactCoefficients) -> float:
     """Return the distance from a resting ball's centre to its contact, half an overlap above the plane."""
-    return RADIUS - 0.5 * static_overlap(contact, ball_mass() * GRAVITY)
+    return RADIUS - 0.5 * worlds.static_overlap(contact, ball_mass() * GRAVITY)
 
 
 def test_a_sliding_ball_comes_to_roll():
@@ -76,11 +60,11 @@ def test_the_tangential_spring_swings_with_its_damping(damped):
     laws = ContactLaws(tangential_damping="tsuji" if damped else "none")
     contact = pair(restitution=0.9, friction=10.0, laws=laws)
     solver = solve(ball_on_plane(contact, velocity=(1e-3 * SPEED, 0.0, 0.0)))
-    seen = record(solver, 4000)
+    seen = worlds.record(solver, 4000)
     slip = seen.velocities[:, 0, 0] - lever(contact) * seen.spins[:, 0, 1]
     # The contact point swings on S_t with the mass 1 / (1/m + L^2/I), 2/7 m for a solid ball; the damping is
     # that of the contact, c = 2 sqrt(5/6) |beta| sqrt(S_t m).
-    overlap = static_overlap(contact, ball_mass() * GRAVITY)
+    overlap = worlds.static_overlap(contact, ball_mass() * GRAVITY)
     stiffness = 8.0 * contact.shear_modulus * math.sqrt(RADIUS * overlap)
     inverse_mass = (1.0 + 2.5 * (lever(contact) / RADIUS) ** 2) / ball_mass()
     decay = 0.5 * damped * contact.damping * math.sqrt(stiffness * ball_mass()) * inverse_mass
@@ -122,7 +106,7 @@ def test_a_ball_stays_on_a_slope_below_the_rolling_angle():
     # It hangs on the tangential spring, S_t = 8 G* sqrt(R d), which carries the weight's part along the
     # slope.
     weight = ball_mass() * GRAVITY
-    overlap = static_overlap(contact, weight * math.cos(math.radians(slope)))
+    overlap = worlds.static_overlap(contact, weight * math.cos(math.radians(slope)))
     stiffness = 8.0 * contact.shear_modulus * math.sqrt(RADIUS * overlap)
     assert late["positions"][0, 1] == pytest.approx(
         weight * math.sin(math.radians(slope)) / stiffness, rel=1e-6
@@ -137,7 +121,7 @@ def test_rolling_friction_stops_a_spin_and_never_reverses_it():
     # The law is directional but knows no axis: it brakes a twist as it brakes a roll.
     rate = rolling * ball_mass() * GRAVITY * lever(contact) / (0.4 * ball_mass() * RADIUS**2)
     steps = int(spin / rate / TIME_STEP)
-    seen = record(solver, steps + 50).spins[:, 0, 2]
+    seen = worlds.record(solver, steps + 50).spins[:, 0, 2]
     # A constant torque: a straight line, whose slope wavers by the integration of the overlap.
     assert seen[steps // 2] == pytest.approx(spin - rate * (steps // 2) * TIME_STEP, rel=1e-6)
     assert (np.diff(seen) <= 0.0).all()
@@ -148,10 +132,16 @@ def test_rolling_friction_stops_a_spin_and_never_reverses_it():
 def pyramid_on_slope(friction: float, slope: float) -> WorldSetup:
     foot = -(PYRAMID.centers[:, 2] - PYRAMID.radii).min()
     contact = pair(restitution=0.2, friction=friction)
-    bodies = grains([0.0, 0.0, foot])
-    time_step = 0.25 * rayleigh_time(float(PYRAMID.radii.min()), GRAIN)
-    return world(
-        bodies, contact, time_step, walls=(Plane(),), gravity=downhill(slope), shapes=(PYRAMID,), skin=1e-3
+    bodies = worlds.grains([0.0, 0.0, foot])
+    time_step = 0.25 * rayleigh_time(float(PYRAMID.radii.min()), worlds.GRAIN)
+    return worlds.world(
+        bodies,
+        contact,
+        time_step,
+        walls=(Plane(),),
+        gravity=worlds.downhill(slope),
+        shapes=(PYRAMID,),
+        skin=1e-3,
     )
 
 
@@ -198,7 +188,7 @@ def downhill_pull(incline: float, friction: float) -> float:
 def gain(solver: Solver, incline: float, chunks: int) -> float:
     """Tilt the slope to an incline; return the change of the speed [m/s] in some chunks after the first."""
     setup = solver.model.world.numpy()
-    setup["gravity"] = downhill(math.degrees(math.atan(incline)))
+    setup["gravity"] = worlds.downhill(math.degrees(math.atan(incline)))
     solver.model.world.assign(setup)
     solver.advance(1)
     before = state(solver)["velocities"][0, 1]
@@ -230,7 +220,7 @@ def test_friction_that_weakens_follows_the_closed_form_on_either_side_of_the_cri
     critical = -weakening_speed * math.log((incline - weak) / strong)
     speeds = critical * np.array([0.5, 1.0, 2.0])
     steps = 1000
-    seen = record(solve(*(block(law, incline, speed) for speed in speeds)), steps).velocities[:, :, 1]
+    seen = worlds.record(solve(*(block(law, incline, speed) for speed in speeds)), steps).velocities[:, :, 1]
     # dv/dt = a - b exp(-v / v0) is linear in exp(v / v0).
     drive = downhill_pull(incline, weak)
     drag = drive - downhill_pull(incline, weak + strong)

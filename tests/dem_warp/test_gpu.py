@@ -5,16 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import warp as wp
-from worlds import (
-    assert_same_bits,
-    assert_same_result,
-    finish,
-    oblique_impact,
-    pile,
-    small_case,
-    solve,
-    state,
-)
+import worlds
+from worlds import assert_same_bits, assert_same_result, finish, pile, small_case, solve, state
 
 from dem_warp import simulate
 from dem_warp.batch import Batch
@@ -103,7 +95,7 @@ def test_meshes_and_motions_follow_the_cpu():
 def test_an_impact_follows_the_cpu():
     ends = {}
     for precision, device in (("double", "cpu"), ("double", "cuda"), ("mixed", "cuda")):
-        solver = solve(oblique_impact(), precision=precision, device=device)
+        solver = solve(worlds.oblique_impact(), precision=precision, device=device)
         solver.advance(2)
         ends[precision, device] = state(solver)
     exact = ends["double", "cpu"]

@@ -7,24 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from worlds import (
-    GRAIN,
-    GRAVITY,
-    RADIUS,
-    SMALL_TUBE,
-    TIME_STEP,
-    assert_measured_as_declared,
-    assert_same_bits,
-    ball_mass,
-    grains,
-    pair,
-    pile,
-    run_for,
-    small_case,
-    solve,
-    state,
-    world,
-)
+import worlds
+from worlds import GRAVITY, SMALL_TUBE, assert_measured_as_declared, ball_mass, run_for, small_case, solve
 
 from dem_warp import Case, CaseResult, simulate
 from dem_warp.device import resolve_device
@@ -60,14 +44,20 @@ def loads(setup: WorldSetup, settled: float, precision: str = "mixed") -> list[f
 
 def test_each_side_of_a_groove_carries_half_of_a_ball():
     walls = Plane(normal=(SLANT, 0.0, SLANT)), Plane(normal=(-SLANT, 0.0, SLANT))
-    place = [0.0, 0.0, RADIUS / SLANT]
-    groove = world(grains(place), pair(restitution=0.1), TIME_STEP, walls=walls, gravity=(0.0, 0.0, -GRAVITY))
+    place = [0.0, 0.0, worlds.RADIUS / SLANT]
+    groove = worlds.world(
+        worlds.grains(place),
+        worlds.pair(restitution=0.1),
+        worlds.TIME_STEP,
+        walls=walls,
+        gravity=(0.0, 0.0, -GRAVITY),
+    )
     # At rest; a count is 2**-29 of the weight at the most, and rounds a force of that order.
     assert loads(groove, 0.3, "double") == pytest.approx([-0.5 * WEIGHT] * 2, rel=1e-8)
 
 
 def test_floor_and_tube_carry_the_grains_between_them():
-    bed = pile(count=16)
+    bed = worlds.pile(count=16)
     weight = bed.masses.sum() * GRAVITY
     floor, tube = loads(bed, 0.4)
     # The grains still tremble by some 2e-5 of g, the sum of what the boundaries do not balance.
@@ -78,8 +68,8 @@ def test_floor_and_tube_carry_the_grains_between_them():
 
 @pytest.mark.parametrize("precision", ["double", "mixed"])
 def test_an_impact_gives_the_floor_the_momentum_of_the_ball(precision):
-    fall = grains([0.0, 0.0, 1.2 * RADIUS], velocities=(0.3, 0.0, -1.0))
-    setup = world(fall, pair(restitution=0.4, friction=0.3), TIME_STEP, walls=(Plane(),))
+    fall = worlds.grains([0.0, 0.0, 1.2 * worlds.RADIUS], velocities=(0.3, 0.0, -1.0))
+    setup = worlds.world(fall, worlds.pair(restitution=0.4, friction=0.3), worlds.TIME_STEP, walls=(Plane(),))
     solver = solve(setup, precision=precision)
     run_for(solver, 0.01)
     [after] = solver.view([0])
@@ -91,11 +81,13 @@ def test_an_impact_gives_the_floor_the_momentum_of_the_ball(precision):
 
 
 def test_a_world_without_a_weighed_wall_has_the_same_bits():
-    weighed, not_weighed = (solve(replace(pile(), weighed=wall), precision="mixed") for wall in (0, None))
+    weighed, not_weighed = (
+        solve(replace(worlds.pile(), weighed=wall), precision="mixed") for wall in (0, None)
+    )
     for solver in (weighed, not_weighed):
         solver.advance(8)
     assert weighed.impulses()[0] < 0.0 == not_weighed.impulses()[0]
-    assert_same_bits(state(weighed), state(not_weighed))
+    worlds.assert_same_bits(worlds.state(weighed), worlds.state(not_weighed))
 
 
 def test_a_tube_without_friction_draws_no_grains_along(heap):
@@ -155,7 +147,7 @@ def fallen(given: Callable[[float], float]) -> dict[str, float]:
     place = rng.uniform(-1.0, 1.0, (count, 2)) * SLANT * SMALL_TUBE.diameter / 2
     place[40:] += SMALL_TUBE.diameter
     alive, moving = np.ones(count, dtype=bool), np.ones((count, 3))
-    masses = np.full(count, GRAIN.density * 1e-8)
+    masses = np.full(count, worlds.GRAIN.density * 1e-8)
 
     def view(step: int) -> WorldView:
         time = step * setup.time_step

@@ -5,21 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import (
-    BOOT,
-    GRAIN,
-    PYRAMID,
-    SMALL_TUBE,
-    assert_same_result,
-    grains,
-    pair,
-    run_batch,
-    run_for,
-    small_case,
-    solve,
-    state,
-    world,
-)
+import worlds
+from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, assert_same_result, grains, pair, run_batch, small_case
 
 from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, ShapeMixture, simulate
 from dem_warp.device import resolve_device
@@ -247,11 +234,13 @@ def test_a_vibration_flattens_the_heap_and_ends_before_it_rests(low_heap):
 
 def test_air_takes_velocity_at_its_rate():
     rate, speed, step = 5.0, 0.2, 1e-4
-    still = replace(world(grains(np.zeros(3), velocities=[speed, 0.0, 0.0]), pair(), step), air_drag=rate)
-    solver = solve(still)
-    run_for(solver, 0.2)
+    still = replace(
+        worlds.world(grains(np.zeros(3), velocities=[speed, 0.0, 0.0]), pair(), step), air_drag=rate
+    )
+    solver = worlds.solve(still)
+    worlds.run_for(solver, 0.2)
     time = int(solver.grains[0].step.numpy()[0]) * step
-    end = state(solver)
+    end = worlds.state(solver)
     # The decay of every step is exact: rounding of float64 over 2,000 steps.
     assert end["velocities"][0, 0] == pytest.approx(speed * math.exp(-rate * time), rel=1e-12)
     # The path is the sum over the steps, of first order in the step.

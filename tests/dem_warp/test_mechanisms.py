@@ -5,23 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import (
-    BALL,
-    PYRAMID,
-    RADIUS,
-    Impact,
-    assert_same_bits,
-    ball_mass,
-    ball_on_plane,
-    grains,
-    pair,
-    pile,
-    record,
-    run_for,
-    solve,
-    state,
-    world,
-)
+import worlds
+from worlds import BALL, PYRAMID, RADIUS, Impact, ball_mass, ball_on_plane, pair, pile, run_for, solve, state
 
 from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.contact_law import contact_law
@@ -84,7 +69,7 @@ def test_a_pile_with_all_mechanisms_comes_to_rest_and_its_contacts_survive_rebui
     often.cycle_limit = 2
     run_for(often, FALL)
     assert often.rebuilds.numpy()[0] > 100
-    assert_same_bits(state(often), midst)
+    worlds.assert_same_bits(state(often), midst)
     run_for(solver, 0.2)
     assert solver.flags.numpy()[0] == often.flags.numpy()[0] == 0
     end = state(solver)
@@ -150,8 +135,10 @@ def test_a_bridge_outlasts_the_touch_and_a_dent_does_not():
     water = CapillaryBridge(surface_tension=0.07, bridge_volume=2e-11)
     contact, speed = pair(mechanisms=only(water, HystereticSpring(plasticity=0.5))), 0.03
     step = Impact.of(contact, RADIUS, ball_mass(), speed).duration / 200.0
-    ball = grains([0.0, 0.0, RADIUS], velocities=[0.0, 0.0, -speed])
-    seen = record(solve(world(ball, contact, step, walls=(Plane(),), shapes=(BALL, PYRAMID))), 4000)
+    ball = worlds.grains([0.0, 0.0, RADIUS], velocities=[0.0, 0.0, -speed])
+    seen = worlds.record(
+        solve(worlds.world(ball, contact, step, walls=(Plane(),), shapes=(BALL, PYRAMID))), 4000
+    )
     overlap = RADIUS - seen.positions[:-1, 0, 2]
     # It comes off the plane, swings back in its bridge, and touches again.
     first_flight = np.flatnonzero(overlap <= 0.0)[1]

@@ -5,30 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import worlds
 from scipy.spatial.transform import Rotation
-from worlds import (
-    GRAVITY,
-    RADIUS,
-    TIME_STEP,
-    assert_same_bits,
-    ball_mass,
-    downhill,
-    grains,
-    pair,
-    run_for,
-    settle,
-    solve,
-    state,
-    static_overlap,
-    world,
-)
+from worlds import GRAVITY, RADIUS, TIME_STEP, ball_mass, downhill, grains, pair, run_for, solve, state, world
 
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.triangles import TriangleTable
 from dem_warp.walls import Mesh, Motion, Plane
 
 CONTACT = pair(restitution=0.1)
-OVERLAP = static_overlap(CONTACT, ball_mass() * GRAVITY)
+OVERLAP = worlds.static_overlap(CONTACT, ball_mass() * GRAVITY)
 SLANT = math.sqrt(0.5)
 CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 SIDES = np.array(
@@ -65,7 +51,7 @@ def plate(cells: int, half: float = 0.06, shift: float = 0.0) -> Mesh:
     ],
 )
 def test_a_ball_rests_on_every_part_of_a_mesh(mesh, nearest, outward):
-    end = settle(CONTACT, mesh, np.add(nearest, np.multiply(RADIUS, outward)), np.negative(outward))
+    end = worlds.settle(CONTACT, mesh, np.add(nearest, np.multiply(RADIUS, outward)), np.negative(outward))
     np.testing.assert_allclose(
         end, np.add(nearest, np.multiply(RADIUS - OVERLAP, outward)), rtol=0.0, atol=1e-6 * OVERLAP
     )
@@ -75,8 +61,8 @@ def test_a_ball_in_a_groove_touches_both_sides():
     # A right-angled groove along x: each side carries m g / sqrt(2).
     vertices = [[x, y, abs(y)] for x in (-0.05, 0.05) for y in (-0.03, 0.0, 0.03)]
     groove = Mesh(vertices, [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]])
-    end = settle(CONTACT, groove, [0.0, 0.0, RADIUS / SLANT], [0.0, 0.0, -1.0])
-    overlap = static_overlap(CONTACT, ball_mass() * GRAVITY * SLANT)
+    end = worlds.settle(CONTACT, groove, [0.0, 0.0, RADIUS / SLANT], [0.0, 0.0, -1.0])
+    overlap = worlds.static_overlap(CONTACT, ball_mass() * GRAVITY * SLANT)
     np.testing.assert_allclose(end, [0.0, 0.0, (RADIUS - overlap) / SLANT], rtol=0.0, atol=1e-6 * OVERLAP)
 
 
@@ -167,4 +153,4 @@ def test_a_world_goes_on_with_its_moving_mesh_in_a_batch_with_another():
         run_for(solver, 0.02)
         solver.move_wall(w, 0, Motion((0.0, 0.0, -0.01)))
         run_for(solver, 0.02)
-    assert_same_bits(state(second, 1), state(whole))
+    worlds.assert_same_bits(state(second, 1), state(whole))

@@ -4,22 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import (
-    PILE_STEP,
-    PILE_TUBE,
-    PYRAMID,
-    SMALL_TUBE,
-    assert_same_bits,
-    grains,
-    pair,
-    pile,
-    run_for,
-    small_case,
-    solve,
-    spheres_of,
-    state,
-    world,
-)
+import worlds
+from worlds import PILE_STEP, PILE_TUBE, PYRAMID, assert_same_bits, grains, pair, pile, run_for, solve, state
 
 from dem_warp.entries import MAX_SPHERES_PER_GRAIN, max_partners, partner_bits
 from dem_warp.solver import CHUNK, Solver
@@ -52,7 +38,7 @@ def near(solver: Solver, skin: float, path: float | np.ndarray = 0.0) -> set[tup
     With paths that grains have come since, only those that were nearer than the skin before.
     """
     poses, sizes = state(solver), solver.worlds[0].grains.sizes
-    centers, radii = spheres_of(PYRAMID, poses, sizes)
+    centers, radii = worlds.spheres_of(PYRAMID, poses, sizes)
     owner = np.arange(len(radii)) // SPHERES
     gap = np.linalg.norm(centers[:, None] - centers[None], axis=2) - radii[:, None] - radii[None]
     path = np.broadcast_to(path, len(sizes))[owner]
@@ -84,7 +70,7 @@ def test_the_lists_are_those_of_brute_force():
             orientations=rng.normal(size=(50, 4)),
             sizes=rng.uniform(0.8, 1.2, 50),
         )
-        setup = world(
+        setup = worlds.world(
             bodies,
             pair(),
             PILE_STEP,
@@ -122,7 +108,7 @@ def test_contacts_keep_their_history_over_hundreds_of_rebuilds(settled):
 
 def test_grains_that_wait_high_above_are_in_no_list():
     # Sixty grains come down in a column of 0.1 m, so close that each has others about it when it is released.
-    case = small_case(scene=replace(SMALL_TUBE, grain_count=60, rain_rate=300.0))
+    case = worlds.small_case(scene=replace(worlds.SMALL_TUBE, grain_count=60, rain_rate=300.0))
     [setup] = case.scene.prepare([case], "cpu")
     solver, left_out = Solver([setup], "cpu"), []
     owner = np.arange(60 * SPHERES) // SPHERES
@@ -144,7 +130,7 @@ def test_grains_that_wait_high_above_are_in_no_list():
 def test_a_grain_that_outruns_its_skin_is_flagged():
     # At 15 m/s a grain passes its skin of 0.1 mm within 2 steps: no cycle is short enough.
     bodies = grains([0.0, 0.0, 0.05], velocities=[15.0, 0.0, 0.0])
-    setup = world(bodies, pair(), PILE_STEP, shapes=(PYRAMID,), skin=1e-4)
+    setup = worlds.world(bodies, pair(), PILE_STEP, shapes=(PYRAMID,), skin=1e-4)
     solver = solve(setup, precision="mixed")
     solver.advance(1)
     assert solver.flags.numpy()[0] == WorldFlag.LATE_REBUILD

@@ -4,24 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from worlds import (
-    BALL,
-    GRAVITY,
-    RADIUS,
-    TIME_STEP,
-    Impact,
-    Record,
-    ball_mass,
-    ball_on_plane,
-    grains,
-    pair,
-    record,
-    run_for,
-    solve,
-    state,
-    static_overlap,
-    world,
-)
+import worlds
+from worlds import GRAVITY, RADIUS, TIME_STEP, ball_mass, ball_on_plane, pair, record, run_for, solve, state
 
 from dem_warp.laws.conventions import EDEM, RELATIVE, ContactLaws
 from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
@@ -38,17 +22,19 @@ def rolling(choice: str, **numbers: float) -> ContactLaws:
     return ContactLaws(rolling=choice, **numbers)
 
 
-def spun(laws: ContactLaws, spin: tuple[float, float, float], steps: int, friction: float = 0.0) -> Record:
+def spun(
+    laws: ContactLaws, spin: tuple[float, float, float], steps: int, friction: float = 0.0
+) -> worlds.Record:
     """Record a ball that spins in its place on a plane; without friction the torque alone turns it."""
     contact = pair(restitution=0.2, friction=friction, rolling=MU, laws=laws)
     return record(solve(ball_on_plane(contact, spin=spin, laws=laws)), steps)
 
 
 def overlap_of(laws: ContactLaws) -> float:
-    return static_overlap(pair(laws=laws), WEIGHT)
+    return worlds.static_overlap(pair(laws=laws), WEIGHT)
 
 
-def torques(seen: Record) -> np.ndarray:
+def torques(seen: worlds.Record) -> np.ndarray:
     """Return the torque of each step [N m]: a sphere's spin takes it without gyroscopic terms."""
     return INERTIA * np.diff(seen.spins[:, 0], axis=0) / TIME_STEP
 
@@ -194,11 +180,13 @@ def test_gears_roll_freely_with_the_torque_of_deme():
     laws = rolling("deme")
     contact = pair(restitution=0.2, rolling=MU, laws=laws)
     bodies = [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0 * RADIUS]]
-    step = Impact.of(contact, 0.5 * RADIUS, 0.5 * ball_mass(), 0.1).duration / 100.0
+    step = worlds.Impact.of(contact, 0.5 * RADIUS, 0.5 * ball_mass(), 0.1).duration / 100.0
     ends = {}
     for name, spin in (("same", 20.0), ("gears", -20.0)):
-        met = grains(bodies, velocities=[[0, 0, 0.05], [0, 0, -0.05]], spins=[[20.0, 0, 0], [spin, 0, 0]])
-        seen = record(solve(world(met, contact, step, laws=laws)), 150)
+        met = worlds.grains(
+            bodies, velocities=[[0, 0, 0.05], [0, 0, -0.05]], spins=[[20.0, 0, 0], [spin, 0, 0]]
+        )
+        seen = record(solve(worlds.world(met, contact, step, laws=laws)), 150)
         ends[name] = seen.spins[-1, :, 0]
     # Gears roll on each other without a torque; of equal spins both are slowed alike, not one by the other.
     np.testing.assert_allclose(ends["gears"], [20.0, -20.0], rtol=1e-12)
@@ -212,8 +200,8 @@ def test_rvd_takes_the_mean_of_two_spins_of_any_sizes_and_turns_both_alike():
     sizes, overlap, step = np.array([1.0, 0.6]), 1e-5, 1e-7
     place = [0.0, 0.0, 1.6 * RADIUS - overlap]
     spins = [[30.0, 0.0, 5.0], [0.0, 40.0, 0.0]]
-    bodies = grains([[0.0, 0.0, 0.0], place], spins=spins, sizes=sizes)
-    seen = record(solve(world(bodies, contact, step, laws=laws)), 1)
+    bodies = worlds.grains([[0.0, 0.0, 0.0], place], spins=spins, sizes=sizes)
+    seen = record(solve(worlds.world(bodies, contact, step, laws=laws)), 1)
     reduced = 0.375 * RADIUS
     force = 4.0 / 3.0 * contact.modulus * math.sqrt(reduced) * overlap**1.5
     inertia = INERTIA * sizes[:, None] ** 5
@@ -253,7 +241,7 @@ class RollingBall:
     def __init__(self, contact: ContactCoefficients, slope: float = 0.0) -> None:
         weight = ball_mass() * GRAVITY
         angle = math.radians(slope)
-        overlap = static_overlap(contact, weight * math.cos(angle))
+        overlap = worlds.static_overlap(contact, weight * math.cos(angle))
         self.lever = RADIUS - 0.5 * overlap
         self.driving_torque = weight * math.sin(angle) * self.lever
         self.limit = contact.rolling_friction * RADIUS * weight * math.cos(angle)
@@ -306,21 +294,25 @@ def test_a_rolling_ball_stops_after_the_work_of_its_energy_and_swings_back():
 
 def spun_pair(
     contact: ContactCoefficients, laws: ContactLaws = EDEM
-) -> tuple[np.ndarray, np.ndarray, Record]:
+) -> tuple[np.ndarray, np.ndarray, worlds.Record]:
     """Return masses and radii of two unequal balls that meet off-centre and spinning, and their motion."""
     sizes = np.array([1.0, 0.6])
     masses, radii = ball_mass() * sizes**3, RADIUS * sizes
-    bodies = grains(
+    bodies = worlds.grains(
         [[0.0, 0.0, 0.0], [0.001, 0.002, 1.55 * RADIUS]],
         velocities=[[0.0, 0.0, 0.05], [0.02, 0.0, -0.05]],
         spins=[[1.0, -2.0, 30.0], [0.0, 40.0, 0.0]],
         sizes=sizes,
     )
-    step = Impact.of(contact, 0.375 * RADIUS, masses[1], 0.1).duration / 100.0
-    return masses, radii, record(solve(world(bodies, contact, step, shapes=(BALL,), laws=laws)), 400)
+    step = worlds.Impact.of(contact, 0.375 * RADIUS, masses[1], 0.1).duration / 100.0
+    return (
+        masses,
+        radii,
+        record(solve(worlds.world(bodies, contact, step, shapes=(worlds.BALL,), laws=laws)), 400),
+    )
 
 
-def moment_of_momentum(masses: np.ndarray, radii: np.ndarray, seen: Record) -> np.ndarray:
+def moment_of_momentum(masses: np.ndarray, radii: np.ndarray, seen: worlds.Record) -> np.ndarray:
     """Return angular momentum of all balls about the origin, step by step, (steps + 1, 3) [kg m2/s]."""
     orbital = np.cross(seen.positions, seen.velocities) * masses[:, None]
     return (orbital + 0.4 * (masses * radii**2)[:, None] * seen.spins).sum(axis=1)
@@ -340,7 +332,7 @@ def test_two_balls_feel_opposite_twists():
 
 def twisted(contact: ContactCoefficients, patch: float) -> tuple[float, float]:
     """Return limit [N m] and stiffness [N m/rad] of the twist of a ball at rest on a plane."""
-    overlap = static_overlap(contact, ball_mass() * GRAVITY)
+    overlap = worlds.static_overlap(contact, ball_mass() * GRAVITY)
     radius = patch * math.sqrt(RADIUS * overlap)
     limit = 2.0 / 3.0 * radius * contact.static_friction * ball_mass() * GRAVITY
     return limit, 4.0 * contact.shear_modulus * math.sqrt(RADIUS * overlap) * radius**2
@@ -377,7 +369,7 @@ def test_a_twist_within_its_limit_is_damped_as_the_tangential_spring_is():
     swing = math.sqrt(stiffness / INERTIA)
     assert spin * math.sqrt(stiffness * INERTIA) < limit
     # The tangential spring's damping over its stiffness, at the swing's frequency.
-    overlap = static_overlap(contact, ball_mass() * GRAVITY)
+    overlap = worlds.static_overlap(contact, ball_mass() * GRAVITY)
     tangential = 8.0 * contact.shear_modulus * math.sqrt(RADIUS * overlap)
     damping = 0.5 * contact.damping * math.sqrt(ball_mass() / tangential) * swing
     phase = damped_swing(stiffness, INERTIA, damping, 401)

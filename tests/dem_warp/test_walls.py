@@ -4,29 +4,15 @@ import math
 
 import numpy as np
 import pytest
+import worlds
 from scipy.spatial.transform import Rotation
-from worlds import (
-    GRAVITY,
-    RADIUS,
-    TIME_STEP,
-    assert_same_bits,
-    ball_mass,
-    downhill,
-    grains,
-    pair,
-    run_for,
-    settle,
-    solve,
-    state,
-    static_overlap,
-    world,
-)
+from worlds import GRAVITY, RADIUS, TIME_STEP, ball_mass, downhill, grains, pair, run_for, solve, state, world
 
 from dem_warp.types import WorldFlag
 from dem_warp.walls import Cone, Cylinder, Disc, Mesh, Motion, Plane
 
 CONTACT = pair(restitution=0.1)
-OVERLAP = static_overlap(CONTACT, ball_mass() * GRAVITY)
+OVERLAP = worlds.static_overlap(CONTACT, ball_mass() * GRAVITY)
 TUBE = Cylinder(point=(0.01, -0.01, 0.0), radius=0.03, length=0.05)
 PLATE = Disc(point=(0.01, -0.01, 0.0), normal=(0.0, 0.0, 2.0), radius=0.03, inner_radius=0.004)
 FUNNEL = Cone(point=(0.01, -0.01, 0.0), radius=0.01, upper_radius=0.03, length=0.02)
@@ -55,7 +41,7 @@ def test_a_ball_rests_on_every_side_of_a_wall(wall, nearest, outward):
     # off, less the static overlap of a flat wall. On a convex side it balances, for a tenth of its time of
     # fall.
     foot = np.add(wall.point, nearest)
-    end = settle(CONTACT, wall, foot + np.multiply(RADIUS, outward), np.negative(outward))
+    end = worlds.settle(CONTACT, wall, foot + np.multiply(RADIUS, outward), np.negative(outward))
     overlap = RADIUS - np.linalg.norm(end - foot)
     assert overlap == pytest.approx(OVERLAP, rel=1e-6)
     np.testing.assert_allclose(end, foot + np.multiply(RADIUS - OVERLAP, outward), atol=1e-6 * OVERLAP)
@@ -106,7 +92,7 @@ def test_the_wall_of_a_cone_carries_what_a_circling_ball_asks_for():
     # its centre from the axis, and the wall carries m g / sin(a).
     angle = math.radians(30.0)
     inward = np.array([-math.cos(angle), 0.0, math.sin(angle)])
-    overlap = static_overlap(pair(), ball_mass() * GRAVITY / math.sin(angle))
+    overlap = worlds.static_overlap(pair(), ball_mass() * GRAVITY / math.sin(angle))
     place = [0.04 * math.sin(angle), 0.0, 0.04 * math.cos(angle)] + (RADIUS - overlap) * inward
     speed = math.sqrt(GRAVITY * place[0] / math.tan(angle))
     funnel = Cone((0.0, 0.0, 0.0), 0.0, 0.05 * math.tan(angle), 0.05)
@@ -244,7 +230,7 @@ def test_a_wall_that_comes_from_afar_meets_a_ball_in_time(motion):
         assert WorldFlag(int(solver.flags.numpy()[0])) == WorldFlag(0)
         ends.append(state(solver))
     assert ends[0]["velocities"][0, 2] > 0.1
-    assert_same_bits(*ends)
+    worlds.assert_same_bits(*ends)
 
 
 def test_a_wall_too_fast_for_its_cycle_is_flagged():

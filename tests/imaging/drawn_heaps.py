@@ -1,7 +1,5 @@
 """Drawn pictures of heaps with known angles, anti-aliased, so that the truth is finer than a pixel."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

@@ -1,7 +1,5 @@
 """Outlines seen from above, corrected to those of a level camera: bodies of revolution, point by point."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -4,18 +4,8 @@ import numpy as np
 import pytest
 from drawn_heaps import Camera, DrawnHeap, draw
 
-from imaging import (
-    FITS,
-    FitSettings,
-    PictureError,
-    compare,
-    heap_angle,
-    measure,
-    measure_photograph,
-    read_picture,
-    save_picture,
-    snapshot,
-)
+import imaging
+from imaging import FitSettings, PictureError, compare, heap_angle, measure, measure_photograph, save_picture
 
 SCENE = Camera(
     heap=(60, 95, 135),
@@ -30,7 +20,9 @@ SCENE = Camera(
 
 def test_photograph_of_a_whole_scene(tmp_path) -> None:
     picture = draw(DrawnHeap(27, 33), SCENE)
-    np.testing.assert_array_equal(read_picture(save_picture(tmp_path / "scene.png", picture)), picture)
+    np.testing.assert_array_equal(
+        imaging.read_picture(save_picture(tmp_path / "scene.png", picture)), picture
+    )
     angle = measure_photograph(save_picture(tmp_path / "scene.jpg", picture))
     # The promise for smooth heaps of 400 pixels.
     np.testing.assert_allclose([angle.left, angle.right], [27, 33], atol=0.3, rtol=0)
@@ -98,7 +90,7 @@ def test_angles_of_different_fits_are_not_compared() -> None:
 
 def test_every_named_fit_measures_a_straight_flank() -> None:
     picture = draw(DrawnHeap(27, 33))
-    for name in FITS:
+    for name in imaging.FITS:
         angle = measure(picture, name)
         assert angle.fit.name == name
         # The promise for whole flanks of this size.
@@ -112,7 +104,7 @@ def test_every_named_fit_measures_a_straight_flank() -> None:
         lambda: FitSettings("too high", 0.0, 1.2),
         lambda: FitSettings("toe", 0.0, 1.0, toe=-1.0),
         lambda: FitSettings.of("whole"),
-        lambda: snapshot([[0.0, 0.0, 1.0]], [1.0], backend="opengl"),
+        lambda: imaging.snapshot([[0.0, 0.0, 1.0]], [1.0], backend="opengl"),
         lambda: heap_angle([[0.0, 0.0, 1.0]], [1.0], azimuths=1),
         lambda: measure(draw(DrawnHeap(30, 30))).interval(1.5),
     ],

@@ -9,17 +9,8 @@ import numpy as np
 import pytest
 from drawn_heaps import Camera, DrawnHeap, draw
 
-from imaging import (
-    PictureError,
-    find_outline,
-    heap_angle,
-    measure,
-    measure_photograph,
-    overlay,
-    save_picture,
-    silhouette,
-    snapshot,
-)
+import imaging
+from imaging import PictureError, heap_angle, measure, measure_photograph, overlay, silhouette, snapshot
 from imaging.drawing import opengl
 from imaging.geometry import Frame, Spheres
 
@@ -62,7 +53,7 @@ def test_raster_and_pyvista_measure_the_same_angle(heap, angle) -> None:
 def test_shaded_snapshot_is_as_good_as_a_photograph(heap, angle, backend: str, tmp_path) -> None:
     views = angle.views
     picture = snapshot(heap.centers, heap.radii, np.pi / 2, backend=backend, grains=heap.grains)
-    shaded = measure_photograph(save_picture(tmp_path / "heap.jpg", picture.image))
+    shaded = measure_photograph(imaging.save_picture(tmp_path / "heap.jpg", picture.image))
     # Shade and compression move the edge of single grains by a fraction of a pixel.
     assert (shaded.left, shaded.right) == pytest.approx((views[1].left, views[1].right), abs=0.3)
 
@@ -132,7 +123,7 @@ def test_auto_takes_the_raster_where_opengl_does_not_work(heap, monkeypatch) -> 
 
 def test_pictures_carry_their_scale(heap) -> None:
     picture = silhouette(heap.centers, heap.radii)
-    outline = find_outline(picture.image, picture.ground_row, picture.meters_per_pixel)
+    outline = imaging.find_outline(picture.image, picture.ground_row, picture.meters_per_pixel)
     top = float((heap.centers[:, 2] + heap.radii).max())
     # One pixel, and the threshold on a single sphere's top.
     assert outline.height.max() * outline.meters_per_pixel == pytest.approx(top, abs=picture.meters_per_pixel)
@@ -157,7 +148,7 @@ def test_plate_is_found_next_to_stray_grains(heap, tmp_path) -> None:
     strays = np.array([[-0.045, 0.0, 0.001], [0.046, 0.0, 0.001]])
     centers, radii = np.vstack([heap.centers, strays]), np.r_[heap.radii, 0.001, 0.001]
     picture = snapshot(centers, radii, backend="raster")
-    angle = measure_photograph(save_picture(tmp_path / "strays.jpg", picture.image))
+    angle = measure_photograph(imaging.save_picture(tmp_path / "strays.jpg", picture.image))
     # The plate's upper edge is drawn between two rows; compression moves it by less than half a pixel.
     plate = angle.outline.plate
     assert plate.row == pytest.approx(picture.ground_row, abs=0.5)

@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe import (
-    Factor,
-    Goal,
-    ProfileSample,
-    Sample,
-    central_composite,
-    fit_surface,
-    joint_fit,
-    scatter_of_views,
-)
+import doe
+from doe import Factor, Goal, ProfileSample, Sample, central_composite, fit_surface, joint_fit
 from doe.errors import RuleError
 
 PLACES = np.linspace(-1.0, 1.0, 9)
@@ -134,6 +126,6 @@ def test_few_profiles_are_shrunk_to_the_scatter_of_their_views() -> None:
         views = [heap + drawn(4, 900 + 10 * seed + number, 0.4) for number, heap in enumerate(own)]
         profiles = np.array([heap.mean(axis=0) for heap in views])
         between = true * (1.0 + 0.4**2 / 4)
-        for found, target in ((worse, None), (better, scatter_of_views(views))):
+        for found, target in ((worse, None), (better, doe.scatter_of_views(views))):
             found.append(np.linalg.norm(ProfileSample.of(profiles, target).covariance - between))
     assert np.mean(better) < 0.9 * np.mean(worse)

@@ -6,19 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from doe import (
-    Design,
-    DesignError,
-    Factor,
-    agreement,
-    central_composite,
-    climb_table,
-    fit_surface,
-    plackett_burman,
-    pure_error,
-    screen,
-    steepest_path,
-)
+import doe
+from doe import Design, DesignError, Factor, agreement, central_composite, fit_surface, pure_error, screen
 
 FACTORS = [Factor("A", 100.0, 200.0), Factor("B", 20.0, 60.0), Factor("C", -1.0, 3.0)]
 
@@ -29,7 +18,7 @@ def rng() -> np.random.Generator:
 
 
 def test_a_screening_sheet_in_run_order_gives_the_factors_of_the_standard_order(rng) -> None:
-    design = plackett_burman(FACTORS, 12, seed=5)
+    design = doe.plackett_burman(FACTORS, 12, seed=5)
     mean = 10.0 + 4.0 * design.coded["A"] - 3.0 * design.coded["C"]
     sheet = design.natural.loc[design.run_order].assign(y=mean + 0.3 * rng.standard_normal(12))
     assert not sheet.index.equals(design.coded.index)
@@ -74,10 +63,12 @@ def test_other_labels_are_refused(change: Callable, message: str) -> None:
 
 
 def test_a_climb_and_its_pure_error_align(rng) -> None:
-    design = plackett_burman(FACTORS, 12)
-    path = steepest_path(screen(design, rng.standard_normal(12)), 3)
+    design = doe.plackett_burman(FACTORS, 12)
+    path = doe.steepest_path(screen(design, rng.standard_normal(12)), 3)
     response = pd.Series([1.0, 2.0, 3.0, 4.0], index=path.coded.index)
-    pd.testing.assert_frame_equal(climb_table(path, response[::-1], 2.5), climb_table(path, response, 2.5))
+    pd.testing.assert_frame_equal(
+        doe.climb_table(path, response[::-1], 2.5), doe.climb_table(path, response, 2.5)
+    )
     settings = pd.DataFrame({"E": [0.0, 0.0, 1.0, 1.0]}, index=path.coded.index)
     assert pure_error(settings, response[::-1]) == pure_error(settings, response)
     # By label 1, 2 and 3, 4 are pairs: (1/2)^2 twice each.

@@ -1,26 +1,13 @@
 """A synthetic world for the statistics: known quadratic responses, correlated noise, known mechanisms."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
-from doe.discrepancy import (
-    Bank,
-    Emulator,
-    Measured,
-    MechanismRange,
-    Outcomes,
-    Point,
-    SearchSpace,
-    Settings,
-    bank_points,
-    fit_emulator,
-    make_bank,
-)
+from doe import discrepancy
+from doe.discrepancy import Bank, Measured, MechanismRange, Outcomes, Point, SearchSpace, bank_points
 
 OBSERVABLES = (
     "flank_angle", "concavity", "height", "r50", "r90", "asymmetry",
@@ -34,7 +21,7 @@ BEYOND = 0.45
 """Standard deviation of what it does besides, in that of one run at its largest size."""
 SATURATION = 0.3
 """Saturation of ``alpha``, in a range of 2: the first third has nearly the whole effect."""
-SETTINGS = Settings(bank_points=128, bank_mechanism_points=64)
+SETTINGS = discrepancy.Settings(bank_points=128, bank_mechanism_points=64)
 
 
 def space(mechanisms: Sequence[str] = MECHANISMS) -> SearchSpace:
@@ -139,13 +126,13 @@ def bank(mechanisms: tuple[str, ...] = MECHANISMS) -> Bank:
     """Return the bank of the synthetic world."""
     points = bank_points(space(mechanisms), SETTINGS, seed=1)
     simulator = SyntheticSimulator(space(mechanisms))
-    return make_bank(space(mechanisms), OBSERVABLES, points, simulator(points))
+    return discrepancy.make_bank(space(mechanisms), OBSERVABLES, points, simulator(points))
 
 
 @cache
-def emulator(mechanisms: tuple[str, ...] = MECHANISMS) -> Emulator:
+def emulator(mechanisms: tuple[str, ...] = MECHANISMS) -> discrepancy.Emulator:
     """Return the emulator of the synthetic world's bank."""
-    return fit_emulator(bank(mechanisms))
+    return discrepancy.fit_emulator(bank(mechanisms))
 
 
 def measure(
@@ -185,4 +172,4 @@ def saturating_bank() -> tuple[Saturating, Bank]:
     """Return a bank of that world, of sizes all over the range, which knows nothing of it."""
     world = Saturating(space(("alpha",)))
     points = bank_points(world.space, SETTINGS, seed=5)
-    return world, make_bank(world.space, OBSERVABLES, points, world(points))
+    return world, discrepancy.make_bank(world.space, OBSERVABLES, points, world(points))

@@ -1,7 +1,5 @@
 """Rules by which two models count as distinct."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

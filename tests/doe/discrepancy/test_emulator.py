@@ -1,7 +1,5 @@
 """The bank and its emulator: noise, surfaces, the errors that they state."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -9,38 +7,20 @@ from typing import Never
 
 import numpy as np
 import pytest
+import synthetic_world
 from scipy import stats
-from synthetic_world import (
-    CONDITIONS,
-    OBSERVABLES,
-    SETTINGS,
-    SyntheticSimulator,
-    bank,
-    emulator,
-    measure,
-    space,
-)
+from synthetic_world import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, space
 
 from doe.discrepancy import Bank, Outcomes, bank_points, fit_emulator, fitted, load_bank, make_bank
-from doe.discrepancy.emulation import kriged_parts
+from doe.discrepancy.emulation import kriged_parts, surface_fits
 from doe.discrepancy.emulation.kriged_parts import KrigedParts
 from doe.discrepancy.emulation.run_noise import ALIKE, fit_noise
-from doe.discrepancy.emulation.surface_fits import (
-    AddedRuns,
-    BaseRuns,
-    fit_additions,
-    fit_bases,
-    likeliest_scales,
-)
+from doe.discrepancy.emulation.surface_fits import AddedRuns, BaseRuns, fit_additions, fit_bases
 from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import gather
 from doe.discrepancy.fitting.model_fit import fit, whiten
 from doe.errors import RuleError
-from doe.numerics.kriging import (
-    Covariance,
-    fit_kriging,
-    krige,
-)
+from doe.numerics.kriging import Covariance, fit_kriging, krige
 
 
 def test_points_are_the_same_whenever_asked_and_every_case_has_its_own_seed() -> None:
@@ -204,7 +184,7 @@ def test_what_all_observables_bend_alike_does_not_move_the_factors() -> None:
     squares = []
     for seed in range(10):
         theta = np.random.default_rng(seed).uniform(-0.9, 0.9, 3)
-        data = measure({}, seed, theta=tuple(known.natural_theta(_warped(theta))))
+        data = synthetic_world.measure({}, seed, theta=tuple(known.natural_theta(_warped(theta))))
         fitted = fit(Stack(Model(bent, (), 0.0), gather(data, bent).training))
         squares.append(((fitted.x - theta) / fitted.errors) ** 2)
     # 30 squares of normal numbers; without terms of third order their sum is 160.
@@ -253,7 +233,7 @@ def test_scales_of_coefficients_are_found_behind_their_noise() -> None:
         grams.append(terms.T @ terms)
         moments.append(terms.T @ data)
     # 2000 coefficients: a scale of 3 is known to 1.6 %, one of 0.5, as large as its noise, to some 4 %.
-    np.testing.assert_allclose(likeliest_scales(grams, moments), true, rtol=0.15)
+    np.testing.assert_allclose(surface_fits.likeliest_scales(grams, moments), true, rtol=0.15)
 
 
 def test_the_scatter_under_a_mechanism_has_a_correlation_of_its_own() -> None:

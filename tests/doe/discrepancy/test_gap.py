@@ -1,7 +1,5 @@
 """Calibration and the test for a gap: sizes of errors, rates of false alarms, what could be seen."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -10,17 +8,8 @@ import pytest
 from scipy import stats
 from synthetic_world import OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure, space
 
-from doe.discrepancy import (
-    Answer,
-    Measured,
-    MechanismRange,
-    Power,
-    Question,
-    Settings,
-    bank_points,
-    fit_emulator,
-    make_bank,
-)
+from doe import discrepancy
+from doe.discrepancy import Answer, Measured, MechanismRange, Power, Question, Settings, bank_points
 from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, drift_p, find_gap, holm
 from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.power import CODED_SIZES, Effects, powers
@@ -73,8 +62,8 @@ def test_the_residuals_of_a_small_bank_point_at_no_mechanism() -> None:
     squares, plain = [], []
     for seed in range(4):
         points = bank_points(world, few, seed)
-        bank = make_bank(world, OBSERVABLES, points, SyntheticSimulator(world)(points))
-        known = fit_emulator(bank).without("twin")
+        bank = discrepancy.make_bank(world, OBSERVABLES, points, SyntheticSimulator(world)(points))
+        known = discrepancy.fit_emulator(bank).without("twin")
         for number in range(5):
             evidence = gather(measure({}, 10 * seed + number), known)
             fitted = fit(Stack(Model(known, (), 0.0), evidence.training))

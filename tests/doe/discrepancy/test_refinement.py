@@ -1,7 +1,5 @@
 """Fresh runs around the optimum of an emulator that is off."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Measured data as arrays: means and covariances over what was measured, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Two mechanisms that act alike, and a bank of so few runs that it does not show it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,21 +1,14 @@
 """The scatter of runs: variances and correlations from repeats, and weights that hold their level."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from doe.discrepancy.emulation import run_noise
 from doe.discrepancy.emulation.condition_surfaces import cubic
-from doe.discrepancy.emulation.run_noise import (
-    ALIKE,
-    fit_noise,
-    fit_noises,
-    repeat_deviations,
-    shared_correlations,
-)
+from doe.discrepancy.emulation.run_noise import ALIKE, fit_noise, fit_noises, shared_correlations
 from doe.discrepancy.emulation.surface_fits import BaseRuns, fit_bases, shared_misfits
 
 FLOOR = np.full(6, 1e-9)
@@ -27,7 +20,7 @@ def test_deviations_of_repeats_have_the_covariance_of_one_run() -> None:
     triangle = np.array([[1.0, 0.0], [0.8, 0.6]])
     offsets = 50.0 * rng.standard_normal((400, 2))
     values = offsets[groups] + rng.standard_normal((1200, 2)) @ triangle.T
-    _, deviations = repeat_deviations(groups, values)
+    _, deviations = run_noise.repeat_deviations(groups, values)
     assert len(deviations) == 800
     # A variance from 800 deviations has a relative error of sqrt(2 / 800); four of those.
     np.testing.assert_allclose(

@@ -1,7 +1,5 @@
 """The rules of an analysis: written, hashed, read again, refused where they make no sense."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import fields, replace
 from pathlib import Path

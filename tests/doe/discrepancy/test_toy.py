@@ -1,7 +1,5 @@
 """The package as someone uses it who has a plain Python function for a simulator, and arrays for data."""
 
-from __future__ import annotations
-
 import doctest
 import re
 from collections.abc import Mapping, Sequence

@@ -1,23 +1,13 @@
 """The analysis as a whole on a synthetic world: every verdict, its guards, and data with something wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from synthetic_world import (
-    BLENDED,
-    CONDITIONS,
-    OBSERVABLES,
-    SETTINGS,
-    SyntheticSimulator,
-    emulator,
-    measure,
-    space,
-)
+import synthetic_world
+from synthetic_world import BLENDED, CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure
 
 from doe.discrepancy import Discovery, Emulator, Measured, Outcomes, Point, Settings, Verdict, analyse
 from doe.discrepancy.analysis import DOUBTED
@@ -37,7 +27,7 @@ def _run(
     settings: Settings = SETTINGS,
 ) -> tuple[Discovery, list[list[Point]]]:
     """Drive an analysis; lost cases, given by their number in the batch and their point, have no values."""
-    waves, simulator = [], SyntheticSimulator(space())
+    waves, simulator = [], SyntheticSimulator(synthetic_world.space())
     analysis = analyse(measured, known, settings, seed=5)
     try:
         points = next(analysis)

@@ -7,17 +7,8 @@ import pytest
 from matplotlib.figure import Figure
 from scipy import stats
 
-from doe import (
-    Category,
-    DesignError,
-    Factor,
-    Wish,
-    central_composite,
-    fit_surface,
-    full_factorial,
-    plots,
-    two_level_effects,
-)
+import doe
+from doe import Category, DesignError, Factor, Wish, central_composite, fit_surface, full_factorial, plots
 from doe.plots.plot_data import half_normal_points, surface_grid
 
 TARGET = 30.148
@@ -147,7 +138,7 @@ def test_figures_are_drawn_on_given_axes(reduced, screening, measured):
     axes = figure.subplots(2, 3).ravel()
     design, response = cube_data()
     noise = np.random.default_rng(7).normal(size=response.shape)
-    effects = two_level_effects(design, response + noise)
+    effects = doe.two_level_effects(design, response + noise)
     drawings = [
         plots.pareto_chart(screening, axes=axes[0]),
         plots.half_normal_plot(effects, axes=axes[1]),

@@ -5,14 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from doe import (
-    Design,
-    Factor,
-    Surface,
-    box_behnken,
-    central_composite,
-    fit_surface,
-)
+from doe import Design, Factor, Surface, box_behnken, central_composite, fit_surface
 
 QUICK = settings(max_examples=4, deadline=None, derandomize=True)
 SEEDS = st.integers(0, 2**16)

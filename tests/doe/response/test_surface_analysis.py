@@ -4,29 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from doe import (
-    Category,
-    Design,
-    DesignError,
-    Factor,
-    Wish,
-    box_cox,
-    canonical,
-    central_composite,
-    fit_formula,
-    fit_mixture,
-    fit_surface,
-    fractional_factorial,
-    full_factorial,
-    influence,
-    maximize,
-    minimize,
-    most_desirable,
-    ridge_path,
-    simplex_lattice,
-    stationary_region,
-    two_level_effects,
-)
+import doe
+from doe import Design, DesignError, Factor, Wish, canonical, central_composite, fit_surface, ridge_path
 
 FACTORS = [Factor("a", 0.0, 2.0), Factor("b", 10.0, 20.0)]
 
@@ -110,7 +89,7 @@ def test_region_of_the_optimum_covers_it():
     for seed in range(60):
         design, response = drawn(seed, sd=0.4)
         surface = fit_surface(design, response)
-        region = stationary_region(surface, resolution=41)
+        region = doe.stationary_region(surface, resolution=41)
         nearest = (region.coded - [0.3, -0.2]).pow(2).sum(axis=1).argmin()
         hits += bool(region.mask[nearest])
     assert hits / 60 == pytest.approx(0.95, abs=0.085)
@@ -118,17 +97,17 @@ def test_region_of_the_optimum_covers_it():
 
 def test_largest_and_smallest_response():
     surface = fit_surface(*drawn())
-    best = maximize(surface)
+    best = doe.maximize(surface)
     assert best.coded.to_numpy() == pytest.approx(canonical(surface).stationary.coded.to_numpy(), abs=1e-6)
     assert best.at_edge == ()
-    worst = minimize(surface)
+    worst = doe.minimize(surface)
     corners = surface.evaluate([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])[0]
     assert worst.responses.loc["response", "mean"] == pytest.approx(corners.min(), rel=1e-12)
     assert worst.at_edge == ("a", "b")
-    held = maximize(surface, constraints=["a < 0.5"])
+    held = doe.maximize(surface, constraints=["a < 0.5"])
     assert held.natural["a"] < 0.5
     assert held.natural["a"] == pytest.approx(0.5, abs=1e-6)
-    ring = minimize(surface, radius=0.5)
+    ring = doe.minimize(surface, radius=0.5)
     assert np.linalg.norm(ring.coded) == pytest.approx(0.5, rel=1e-6)
     path = ridge_path(surface, [0.5], descend=True)["mean"].iloc[0]
     assert ring.responses.loc["response", "mean"] == pytest.approx(path, rel=1e-9)
@@ -158,7 +137,7 @@ def test_most_desirable_setting_is_that_of_a_fine_grid():
     cost = 1.0 + design.points["a"] + 0.01 * response
     surfaces = {"yield": fit_surface(design, response), "cost": fit_surface(design, cost)}
     wishes = {"yield": Wish(5.0, 11.0), "cost": Wish(0.0, 3.0, larger=False, importance=2.0)}
-    best = most_desirable(surfaces, wishes)
+    best = doe.most_desirable(surfaces, wishes)
     axis = np.linspace(-1.0, 1.0, 201)
     grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     shares = {name: wish.of(surfaces[name].evaluate(grid)[0]) for name, wish in wishes.items()}
@@ -167,15 +146,15 @@ def test_most_desirable_setting_is_that_of_a_fine_grid():
     # The grid's best lies within half a cell of the true one.
     assert best.desirability == pytest.approx(overall.max(), abs=1e-3)
     with pytest.raises(DesignError, match="no setting of the region meets every wish"):
-        most_desirable(surfaces, {**wishes, "yield": Wish(50.0, 60.0)})
+        doe.most_desirable(surfaces, {**wishes, "yield": Wish(50.0, 60.0)})
     with pytest.raises(DesignError, match="wishes must be for every surface"):
-        most_desirable(surfaces, {"yield": Wish(0.0, 1.0)})
+        doe.most_desirable(surfaces, {"yield": Wish(0.0, 1.0)})
 
 
 def test_influence_names_the_run_that_is_wrong():
     design, response = drawn()
     response[6] += 2.0
-    table = influence(fit_surface(design, response))
+    table = doe.influence(fit_surface(design, response))
     assert "outlier" in table["remark"].iloc[6]
     assert (table["remark"].drop(index=table.index[6]).str.contains("outlier")).sum() == 0
     assert table["leverage"].sum() == pytest.approx(6.0, rel=1e-12)
@@ -186,15 +165,15 @@ def test_box_cox_finds_the_scale_that_was_drawn():
     noise = np.random.default_rng(6).normal(scale=0.02, size=len(response))
     for power, transform, advice in ((0.0, np.exp, "log(y)"), (0.5, np.square, "sqrt(y)")):
         scaled = transform(response + noise)
-        found = box_cox(fit_surface(design, scaled))
+        found = doe.box_cox(fit_surface(design, scaled))
         assert found.low < power < found.high
         assert found.advice == advice
     with pytest.raises(DesignError, match="must be positive"):
-        box_cox(fit_surface(design, response - 20.0))
+        doe.box_cox(fit_surface(design, response - 20.0))
 
 
 def test_terms_may_be_written():
-    design = full_factorial([Factor(name, 0.0, 1.0) for name in "abc"], levels=3)
+    design = doe.full_factorial([Factor(name, 0.0, 1.0) for name in "abc"], levels=3)
     x = design.points
     response = 1.0 + x["a"] + 2.0 * x["a"] * x["b"] * x["c"] - x["c"] ** 2
     response = response + np.random.default_rng(3).normal(scale=1e-9, size=len(response))
@@ -217,12 +196,12 @@ def test_terms_may_be_written():
 
 
 def test_formulas_take_categories_and_blocks():
-    variety = Category("variety", ["old", "new", "wild"])
-    design = full_factorial([Factor("t", 20.0, 30.0), variety], levels=3).with_blocks(["m", "n", "m"] * 3)
+    variety = doe.Category("variety", ["old", "new", "wild"])
+    design = doe.full_factorial([Factor("t", 20.0, 30.0), variety], levels=3).with_blocks(["m", "n", "m"] * 3)
     shift = design.natural["variety"].map({"old": 0.0, "new": 2.0, "wild": -1.0}).to_numpy()
     response = 5.0 + 1.5 * design.points["t"].to_numpy() + shift + 4.0 * (design.blocks == "n").to_numpy()
     response = response + np.random.default_rng(2).normal(scale=0.01, size=9)
-    fit = fit_formula(design, response, "t + C(variety)")
+    fit = doe.fit_formula(design, response, "t + C(variety)")
     table = fit.coefficient_table["estimate"]
     assert table["C(variety)[T.new]"] == pytest.approx(2.0, abs=0.05)
     assert table["C(block)[T.n]"] == pytest.approx(4.0, abs=0.05)
@@ -233,35 +212,35 @@ def test_formulas_take_categories_and_blocks():
         fit_surface(design, response)
     for bad in ("t ~ variety", "t +", "t + nonsense"):
         with pytest.raises(DesignError):
-            fit_formula(design, response, bad)
+            doe.fit_formula(design, response, bad)
 
 
 def test_scheffe_polynomial_returns_pure_blends():
-    mixture = simplex_lattice(["x", "y", "z"], 2)
+    mixture = doe.simplex_lattice(["x", "y", "z"], 2)
     truth = (
         mixture.shares["x"] * 3.0
         + mixture.shares["y"] * 5.0
         + mixture.shares["x"] * mixture.shares["y"] * 8.0
     )
     replicates = np.column_stack([truth + 1e-9, truth - 1e-9])
-    fit = fit_mixture(mixture, replicates)
+    fit = doe.fit_mixture(mixture, replicates)
     assert fit.coefficient_table["estimate"].to_numpy() == pytest.approx([3, 5, 0, 8, 0, 0], abs=1e-7)
     with pytest.raises(DesignError, match="model must be one of"):
-        fit_mixture(mixture, replicates, "cubic")
+        doe.fit_mixture(mixture, replicates, "cubic")
 
 
 def test_lenth_names_the_active_effects_of_a_saturated_fraction():
-    design = fractional_factorial([Factor(name, 0.0, 1.0) for name in "abcdefg"], 16)
+    design = doe.fractional_factorial([Factor(name, 0.0, 1.0) for name in "abcdefg"], 16)
     x = design.points
     response = 4.0 * x["a"] - 3.0 * x["b"] * x["d"] + np.random.default_rng(4).normal(scale=0.3, size=16)
-    result = two_level_effects(design, response.to_numpy())
+    result = doe.two_level_effects(design, response.to_numpy())
     assert result.table.index[0] == "a"
     name = result.table.index[1]
     assert "b:d" in {name, *result.table.loc[name, "mixed with"].split(", ")}
     assert result.significant(0.05) == ["a", name]
     assert result.limit(together=True) > result.limit()
     with pytest.raises(DesignError, match="must be five or more"):
-        two_level_effects(full_factorial(FACTORS), [1.0, 2.0, 3.0, 5.0])
+        doe.two_level_effects(doe.full_factorial(FACTORS), [1.0, 2.0, 3.0, 5.0])
 
 
 def test_summary_and_repr_can_be_read():

@@ -1,21 +1,11 @@
 """Surfaces carried over to another process: recovered, honest about their errors, and well placed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
 
-from doe import (
-    Factor,
-    Sample,
-    Surface,
-    central_composite,
-    fit_surface,
-    transfer,
-    transfer_points,
-)
+from doe import Factor, Sample, Surface, central_composite, fit_surface, transfer, transfer_points
 
 E, F = Factor.around("E", 0.4, 0.1), Factor.around("F", 0.05, 0.02)
 DESIGN = central_composite((E, F), "rotatable", 5)

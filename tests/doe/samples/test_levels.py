@@ -6,21 +6,11 @@ The long simulations are the record in experiments/evidence/accuracy/statistics.
 import numpy as np
 import pytest
 
-from doe import (
-    Factor,
-    Goal,
-    Sample,
-    agreement,
-    central_composite,
-    compare_means,
-    fit_surface,
-    joint_fit,
-    plackett_burman,
-    screen,
-)
+import doe
+from doe import Factor, Goal, Sample, agreement, compare_means, fit_surface, plackett_burman, screen
 
 FACTORS = [Factor("A", -1.0, 1.0), Factor("B", -1.0, 1.0)]
-DESIGN = central_composite(FACTORS)
+DESIGN = doe.central_composite(FACTORS)
 POINT = {"A": 0.4, "B": -0.5}
 
 
@@ -42,7 +32,7 @@ def test_intervals_and_regions_after_a_reduction_are_those_of_the_full_model() -
         reduced.compatible_region(target, resolution=30).mask,
         full.compatible_region(target, resolution=30).mask,
     )
-    joint, expected = (joint_fit({"a": Goal(fit, target)}, resolution=30) for fit in (reduced, full))
+    joint, expected = (doe.joint_fit({"a": Goal(fit, target)}, resolution=30) for fit in (reduced, full))
     np.testing.assert_array_equal(joint.region().mask, expected.region().mask)
     # The mean is that of the equation which the reduced model writes.
     coded = np.array([list(POINT.values())])

@@ -5,20 +5,13 @@ import pytest
 from scipy import stats
 from statsmodels.stats.power import TTestIndPower
 
-from doe import (
-    Sample,
-    central_composite,
-    curvature_test,
-    detectable_effect,
-    effect_power,
-    fit_surface,
-    noise_floor,
-)
+import doe
+from doe import Sample, central_composite, curvature_test, detectable_effect, effect_power, fit_surface
 from doe.design.factors import Factor
 
 
 def test_noise_floor_of_five_by_tables():
-    floor = noise_floor(Sample(30.0, 2.0, 5))
+    floor = doe.noise_floor(Sample(30.0, 2.0, 5))
     # Tables: t(0.975, 4) = 2.7764, chi2(4) quantiles 0.4844 and 11.1433.
     assert floor.mean_interval == pytest.approx(
         (30.0 - 2.7764 * 2.0 / np.sqrt(5.0), 30.0 + 2.7764 * 2.0 / np.sqrt(5.0)), abs=1e-4

@@ -3,15 +3,7 @@
 import numpy as np
 import pytest
 
-from doe import (
-    Factor,
-    central_composite,
-    climb_table,
-    fit_surface,
-    plackett_burman,
-    screen,
-    steepest_path,
-)
+from doe import Factor, central_composite, climb_table, fit_surface, plackett_burman, screen, steepest_path
 
 FACTORS = [Factor("A", 0.0, 10.0), Factor("B", 0.2, 0.4), Factor("C", -5.0, 5.0)]
 
