@@ -33,6 +33,7 @@ FORMULA = doe.fit_formula(DESIGN, RESPONSE, "A * B")
 REGION = SURFACE.compatible_region(TARGET, resolution=5)
 CURVE = MeasuredCurve("slow", 0.0, np.array([0]), np.array([1.0]))
 VALUES = [1.0, 2.0, 4.0]
+BLOCKS = pd.Series(1, DESIGN.coded.index)
 
 TODAY = datetime.date(2026, 1, 1)
 THINGS = [None, "x", 3.5, np.nan, {}, pd.DataFrame(), object(), {"q": 3}, [None], True]
@@ -52,174 +53,130 @@ RESPONSES = [
     pd.DataFrame({"angle": RESPONSE, "mass": RESPONSE}, index=DESIGN.coded.index),
 ]  # fmt: skip
 
-CALLS: list[tuple[Callable, dict[str, Any]]] = [
-    (doe.plackett_burman, {"factors": FACTORS, "runs": 12, "seed": 1}),
-    (doe.definitive_screening, {"factors": FACTORS, "spare": 0, "center": 1, "seed": 1}),
-    (doe.full_factorial, {"factors": FACTORS, "levels": 2, "blocks": 2, "center": 1, "seed": 1}),
-    (
-        doe.fractional_factorial,
-        {"factors": [*FACTORS, Factor("D", 0, 1)], "runs": 8, "resolution": 4, "center": 0},
-    ),
-    (
-        doe.central_composite,
-        {"factors": FACTORS, "alpha": 1.5, "center": 2, "seed": 1, "blocks": 2, "full": True},
-    ),
-    (doe.box_behnken, {"factors": FACTORS, "center": 3, "blocks": False, "seed": 1}),
-    (
-        doe.optimal_design,
-        {
-            "factors": FACTORS,
-            "runs": 12,
-            "model": "interaction",
-            "criterion": "D",
-            "levels": 2,
-            "starts": 1,
-            "seed": 1,
-            "existing": CORNERS,
-            "constraints": ["A < 2"],
-        },
-    ),
-    (doe.latin_hypercube, {"factors": FACTORS, "runs": 8, "seed": 1, "optimize": "lloyd"}),
-    (doe.sobol, {"factors": FACTORS, "runs": 8, "seed": 1}),
-    (
-        doe.simplex_lattice,
-        {"components": ["x", "y"], "degree": 2, "interior": True, "lower": {"x": 0.1}, "seed": 1},
-    ),
-    (doe.simplex_centroid, {"components": ["x", "y"], "lower": {"x": 0.1}, "seed": 1}),
-    (doe.Mixture, {"shares": BLENDS.shares, "lower": {}, "seed": 1}),
-    (doe.foldover, {"design": CORNERS, "factors": ["A"]}),
-    (doe.add_center, {"design": CORNERS, "count": 2}),
-    (doe.add_axial, {"design": CORNERS, "alpha": 1.5, "center": 1}),
-    (lambda one, blocks: doe.join(CORNERS, one, blocks=blocks), {"one": DESIGN, "blocks": [1, 2]}),
-    (doe.alias_structure, {"design": CORNERS, "order": 2}),
-    (doe.design_quality, {"design": DESIGN, "model": "quadratic", "constraints": ["A < 2"], "seed": 1}),
-    (
-        doe.power_table,
-        {
-            "design": CORNERS,
-            "effects": [1.0],
-            "model": "first-order",
-            "sd": 1.0,
-            "replicates": 2,
-            "alpha": 0.05,
-        },
-    ),
-    (doe.effect_power, {"effect": 1.0, "sd": 1.0, "observations": 8, "error_df": 4.0, "alpha": 0.05}),
-    (doe.detectable_effect, {"sd": 1.0, "observations": 8, "error_df": 4.0, "alpha": 0.05, "power": 0.8}),
-    (doe.screen, {"design": SCREENING, "response": RESPONSE[:12], "error": "dummies"}),
-    (doe.aliases, {"design": SCREENING, "interaction": "A:B"}),
-    (doe.two_level_effects, {"design": CORNERS, "response": EIGHT, "order": 3}),
-    (
-        doe.steepest_path,
-        {
-            "fit": SCREEN,
-            "steps": 2,
-            "factors": ["A"],
-            "step": 1.0,
-            "start": {"A": 0.5},
-            "limits": {"A": (0.0, 9.0)},
-            "descend": True,
-        },
-    ),
-    (doe.climb_table, {"path": PATH, "response": VALUES, "target": 2.0}),
-    (doe.fit_surface, {"design": DESIGN, "response": RESPONSE, "model": "quadratic"}),
-    (doe.fit_formula, {"design": DESIGN, "response": RESPONSE, "formula": "A * B", "coded": True}),
-    (doe.fit_mixture, {"mixture": BLENDS, "response": EIGHT[:6], "model": "linear"}),
-    (doe.influence, {"surface": SURFACE}),
-    (doe.box_cox, {"surface": SURFACE, "confidence": 0.9}),
-    (doe.robust_coefficients, {"surface": SURFACE}),
-    (doe.canonical, {"surface": SURFACE, "alpha": 0.05}),
-    (doe.ridge_path, {"surface": SURFACE, "radii": [0.5], "descend": True}),
-    (doe.stationary_region, {"surface": SURFACE, "alpha": 0.05, "extent": 1.0, "resolution": 5}),
-    (doe.maximize, {"surface": SURFACE, "extent": 1.0, "radius": 1.0, "constraints": ["A < 2"], "seed": 1}),
-    (doe.minimize, {"surface": SURFACE, "extent": 1.0}),
-    (doe.most_desirable, {"surfaces": SURFACES, "wishes": WISHES, "extent": 1.0}),
-    (doe.compare_means, {"a": VALUES, "b": [2.0, 3.0], "margin": 1.0, "method": "welch", "alpha": 0.05}),
-    (
-        doe.agreement,
-        {
-            "values": VALUES,
-            "reference": VALUES,
-            "value_variance": 0.1,
-            "reference_variance": 0.1,
-            "settings": "abc",
-            "strata": "abc",
-            "confidence": 0.9,
-        },
-    ),
-    (doe.noise_floor, {"values": VALUES, "confidence": 0.9}),
-    (doe.variance_ratio, {"mean_sq": 1.0, "df": 1.0, "error_ms": 1.0, "error_df": 1.0}),
-    (doe.curvature_test, {"corners": VALUES, "centers": VALUES}),
-    (
-        doe.pure_error,
-        {"coded": DESIGN.points, "response": RESPONSE, "blocks": pd.Series(1, DESIGN.coded.index)},
-    ),
-    (doe.joint_fit, {"goals": {"y": Goal(SURFACE, TARGET)}, "alpha": 0.05, "resolution": 5}),
-    (doe.scatter_of_views, {"heaps": [[[1.0], [2.0]]] * 2}),
-    (
-        lambda emulators, curves: doe.fit_curves(emulators, [0.0], curves, 1.0, 1),
-        {"emulators": {}, "curves": [CURVE]},
-    ),
-    (
-        doe.transfer,
-        {"source": SURFACE, "runs": RUNS, "response": RESPONSE[:6], "level": 9.0, "scale_sd": 0.2},
-    ),
-    (
-        doe.transfer_points,
-        {"source": SURFACE, "at": POINT, "count": 5, "step": 0.5, "extent": 1.0, "turn": 0},
-    ),
-    (doe.Factor, {"name": "A", "low": 0.0, "high": 1.0}),
-    (doe.Category, {"name": "c", "levels": ["a", "b"]}),
-    (doe.Sample, {"mean": 1.0, "sd": 1.0, "n": 3}),
-    (Goal, {"surface": SURFACE, "target": TARGET}),
-    (Wish, {"low": 0.0, "high": 2.0, "target": 1.0, "larger": True, "weight": 1.0, "importance": 1.0}),
-    (doe.Design, {"factors": tuple(FACTORS), "coded": DESIGN.coded, "dummies": (), "seed": 1}),
-    (
-        doe.Design.from_table,
-        {"table": DESIGN.coded.assign(day=1), "factors": FACTORS, "coded": True, "block": "day"},
-    ),
-    (DESIGN.select, {"runs": [1]}),
-    (DESIGN.with_blocks, {"labels": [1] * len(DESIGN.coded)}),
-    (DESIGN.factor, {"name": "A"}),
-    (SURFACE.predict, {"points": POINT, "alpha": 0.05, "coded": False}),
-    (SURFACE.evaluate, {"coded": [[0.0, 0.0, 0.0]]}),
-    (SURFACE.reduce, {"alpha": 0.05}),
-    (SURFACE.equation, {"units": "natural", "digits": 3}),
-    (SURFACE.agrees, {"point": POINT, "target": TARGET, "alpha": 0.05, "coded": False}),
-    (
-        SURFACE.compatible_region,
-        {"target": 9.0, "target_se": 0.1, "target_df": 3.0, "alpha": 0.05, "extent": 1.0, "resolution": 5},
-    ),
-    (SURFACE.band, {"target": 9.0, "half_width": 0.5, "resolution": 5}),
-    (SURFACE.nearest, {"target": 9.0, "to": POINT, "extent": 1.0}),
-    (SURFACE.contour, {"target": 9.0, "extent": 1.0, "resolution": 5}),
-    (REGION.axis, {"name": "A"}),
-    (REGION.projection, {"x": "A", "y": "B"}),
-    (JOINT.agrees, {"point": POINT}),
-    (JOINT.band, {"name": "y"}),
-    (SCREEN.critical_t, {"alpha": 0.05, "bonferroni": True}),
-    (SCREEN.significant, {"alpha": 0.05}),
-    (FORMULA.predict, {"points": POINT, "alpha": 0.05}),
-    (CARRIED.evaluate, {"coded": [[0.0, 0.0, 0.0]]}),
-    (CARRIED.intervals, {"alpha": 0.05}),
-    (plots.pareto_chart, {"result": SCREEN, "alphas": [0.05]}),
-    (plots.half_normal_plot, {"result": SCREEN}),
-    (plots.residual_plots, {"surface": SURFACE}),
-    (
-        plots.contour_plot,
-        {"surface": SURFACE, "target": 9.0, "point": POINT, "region": REGION, "x": "A", "extent": 1.0},
-    ),
-    (plots.surface_plot, {"surface": SURFACE, "target": 9.0, "at": POINT}),
-    (plots.main_effects_plot, {"design": CORNERS, "response": EIGHT}),
-    (plots.interaction_plot, {"design": CORNERS, "response": EIGHT, "x": "A", "trace": "B"}),
-    (plots.cube_plot, {"surface": SURFACE, "factors": ["A", "B", "C"], "at": POINT}),
-    (plots.profile_plot, {"surfaces": SURFACES, "at": POINT, "wishes": WISHES}),
-    (plots.overlay_plot, {"surfaces": SURFACES, "limits": {"y": (1.0, 2.0)}, "point": POINT}),
-    (plots.climb_plot, {"path": PATH, "response": VALUES, "target": 2.0, "target_sd": 0.1}),
-    (plots.agreement_plot, {"result": AGREED, "groups": "abc"}),
-    (joint_plot, {"fit": JOINT, "truth": POINT}),
+RIGHT_VALUES: list[tuple[Any, str]] = [
+    (FACTORS, "factors"),
+    ([*FACTORS, Factor("D", 0, 1)], "fractional_factorial.factors"),
+    (tuple(FACTORS), "Design.factors"),
+    (["A"], "foldover.factors steepest_path.factors"),
+    (["A", "B", "C"], "cube_plot.factors"),
+    (CORNERS, "design existing"),
+    (DESIGN, "one design_quality.design fit_surface.design fit_formula.design"),
+    (DESIGN.points, "pure_error.coded"),
+    (DESIGN.coded, "Design.coded"),
+    (DESIGN.coded.assign(day=1), "table"),
+    (BLOCKS, "Design.blocks pure_error.blocks labels"),
+    (SCREENING, "screen.design aliases.design"),
+    (BLENDS, "mixture"),
+    (BLENDS.shares, "shares"),
+    (EIGHT, "response"),
+    (RESPONSE, "fit_surface.response fit_formula.response pure_error.response"),
+    (RESPONSE[:12], "screen.response"),
+    (RESPONSE[:6], "fit_mixture.response transfer.response"),
+    (RUNS, "transfer.runs"),
+    (VALUES, "a values reference corners centers climb_table.response climb_plot.response"),
+    (SURFACE, "surface source"),
+    (SURFACES, "surfaces"),
+    (WISHES, "wishes"),
+    (POINT, "point points at to truth"),
+    (SCREEN, "result steepest_path.fit"),
+    (AGREED, "agreement_plot.result"),
+    (JOINT, "joint_plot.fit"),
+    (PATH, "path"),
+    (REGION, "region"),
+    (TARGET, "Goal.target agrees.target"),
+    ({"y": Goal(SURFACE, TARGET)}, "goals"),
+    ({}, "emulators Mixture.lower"),
+    ([CURVE], "curves"),
+    ([[[1.0], [2.0]]] * 2, "heaps"),
+    ([[0.0, 0.0, 0.0]], "evaluate.coded"),
+    (list("abc"), "settings strata groups"),
+    (["x", "y"], "components"),
+    ({"x": 0.1}, "lower"),
+    ({"A": 0.5}, "start"),
+    ({"A": (0.0, 9.0)}, "limits"),
+    ({"y": (1.0, 2.0)}, "overlay_plot.limits"),
+    (["A < 2"], "constraints"),
+    (["a", "b"], "Category.levels"),
+    ([1, 2], "<lambda>.blocks"),
+    ([2.0, 3.0], "b"),
+    ([1.0], "effects"),
+    ([0.5], "radii"),
+    ([0.05], "alphas"),
+    ([1], "select.runs"),
+    ((), "dummies"),
+    (True, "full interior descend larger bonferroni fit_formula.coded from_table.coded"),
+    (False, "coded box_behnken.blocks"),
+    (0, "spare turn fractional_factorial.center"),
+    (1, "seed center starts"),
+    (2, "blocks degree order replicates levels steps add_center.count"),
+    (3, "n digits"),
+    (4, "fractional_factorial.resolution"),
+    (5, "count resolution"),
+    (8, "runs observations"),
+    (12, "plackett_burman.runs optimal_design.runs"),
+    (0.0, "low"),
+    (0.05, "alpha pareto_chart.bonferroni"),
+    (0.1, "value_variance reference_variance target_se target_sd"),
+    (0.2, "scale_sd"),
+    (0.5, "step half_width"),
+    (0.8, "power"),
+    (0.9, "confidence"),
+    (1.0, "extent radius effect sd mean mean_sq df error_ms margin weight importance Wish.target"),
+    (1.5, "central_composite.alpha add_axial.alpha"),
+    (2.0, "high climb_table.target climb_plot.target"),
+    (4.0, "error_df target_df"),
+    (9.0, "target level"),
+    ("A", "name x"),
+    ("B", "y trace"),
+    ("y", "band.name"),
+    ("A:B", "interaction"),
+    ("A * B", "formula"),
+    ("day", "block"),
+    ("D", "criterion"),
+    ("lloyd", "optimize"),
+    ("dummies", "error"),
+    ("welch", "method"),
+    ("natural", "units"),
+    ("quadratic", "model"),
+    ("interaction", "optimal_design.model"),
+    ("first-order", "power_table.model"),
+    ("linear", "fit_mixture.model"),
 ]
-"""Functions with right arguments, each of which is replaced by wrong ones in turn."""
+"""Right values, and the arguments that take them: of one function, or of all others."""
+RIGHT = {name: value for value, names in RIGHT_VALUES for name in names.split()}
+
+PUBLIC = [
+    getattr(doe, name) for name in doe.__all__ if name[0].islower() and name not in {"join", "fit_curves"}
+]
+DRAWN = [getattr(plots, name) for name in plots.__all__ if name.endswith(("_plot", "_plots", "_chart"))]
+MEMBERS: list[tuple[Any, str]] = [
+    (doe, "Mixture Factor Category Sample Goal Wish Design"),
+    (DESIGN, "from_table select with_blocks factor"),
+    (SURFACE, "predict evaluate reduce equation agrees compatible_region band nearest contour"),
+    (REGION, "axis projection"),
+    (JOINT, "agrees band"),
+    (SCREEN, "critical_t significant"),
+    (FORMULA, "predict"),
+    (CARRIED, "evaluate intervals"),
+]
+FUNCTIONS: list[Callable] = [
+    *PUBLIC,
+    *DRAWN,
+    joint_plot,
+    *(getattr(owner, name) for owner, names in MEMBERS for name in names.split()),
+    lambda one, blocks: doe.join(CORNERS, one, blocks=blocks),
+    lambda emulators, curves: doe.fit_curves(emulators, [0.0], curves, 1.0, 1),
+]
+"""All public functions, and the classes and methods that check what they are given."""
+
+
+def right_values(function: Callable) -> dict[str, Any]:
+    """Return arguments that a function accepts; only those with a default may be missing from the table."""
+    names = {name: f"{function.__name__}.{name}" for name in inspect.signature(function).parameters}
+    return {
+        name: RIGHT.get(own, RIGHT.get(name)) for name, own in names.items() if {own, name} & RIGHT.keys()
+    }
+
 
 MANY, EMPTY = "1000000000", "Empty DataFrame\nColumns: []\nIndex: []"
 MEANINGFUL = {
@@ -227,7 +184,9 @@ MEANINGFUL = {
     **dict.fromkeys(("order", "replicates", "observations", "n", "turn"), (MANY,)),
     **dict.fromkeys(("start", "limits", "lower"), ("{}", "{'q': 3}")),
     **dict.fromkeys(("scale_sd", "target_df"), ("inf",)),
-    **dict.fromkeys(("surface_plot at", "cube_plot at"), ("{}", "{'q': 3}")),
+    **dict.fromkeys(
+        ("surface_plot at", "cube_plot at", "contour_plot at", "overlay_plot at"), ("{}", "{'q': 3}")
+    ),
     **dict.fromkeys(("axis name", "projection x", "projection y", "band name"), ("[]", "{}", EMPTY)),
     **dict.fromkeys(("Factor name", "Category name"), ("'nothing'",)),
     **dict.fromkeys(("compare_means b", "Wish weight"), ("(1.0, 2.0)",)),
@@ -235,8 +194,8 @@ MEANINGFUL = {
     "latin_hypercube optimize": ("None",),
     "<lambda> blocks": ("None",),
     "fit_surface model": ("[]",),
-    "Factor high": ("True",),
-    "agrees target": ("3.5",),
+    **dict.fromkeys(("Factor low", "Factor high"), ("True",)),
+    **dict.fromkeys(("agrees target", "value_variance"), ("3.5",)),
 }
 """Values of the lists above that an argument takes, by their text."""
 
@@ -257,7 +216,8 @@ def wrong_values(function: Callable, name: str) -> Iterator[object]:
 
 CASES = [
     pytest.param(function, right, name, value, id=f"{function.__name__} {name} {number}")
-    for function, right in CALLS
+    for function in FUNCTIONS
+    for right in [right_values(function)]
     for name in right
     for number, value in enumerate(wrong_values(function, name))
 ]
@@ -272,11 +232,9 @@ def test_a_wrong_value_is_rejected_with_its_rule(
     assert len(str(error.value)) > 20
 
 
-def test_every_public_function_is_called_wrongly() -> None:
-    called = {function.__name__ for function, _ in CALLS} | {"join", "fit_curves"}
-    functions = [name for name in doe.__all__ if name[0].islower()]
-    functions += [name for name in plots.__all__ if name.endswith(("_plot", "_plots", "_chart"))]
-    assert set(functions) - called == set()
+@pytest.mark.parametrize("function", PUBLIC + DRAWN)
+def test_right_values_are_accepted(function: Callable) -> None:
+    function(**right_values(function))
 
 
 @pytest.mark.parametrize("name", ["response", "error", "error_percent"])
