@@ -4,19 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from worlds import (
-    GRAVITY,
-    RADIUS,
-    TIME_STEP,
-    Impact,
-    ball_mass,
-    downhill,
-    grains,
-    pair,
-    record,
-    solve,
-    world,
-)
+from worlds import GRAVITY, RADIUS, TIME_STEP, Impact, ball_mass, downhill, grains, pair, record, solve, world
 
 from dem_warp.laws.hysteretic_spring import HystereticSpring
 from dem_warp.model import ContactCoefficients
@@ -41,12 +29,12 @@ def branch(contact: ContactCoefficients, plasticity: float, overlap: np.ndarray,
 @pytest.mark.parametrize("plasticity", [0.75])
 def test_an_impact_gives_the_same_part_back_at_any_speed_and_never_attracts(plasticity):
     contact, speeds = dented(plasticity), (0.02, 0.2, 2.0)
-    worlds = []
+    setups = []
     for speed in speeds:
         step = Impact.of(contact, RADIUS, ball_mass(), speed).duration / 1000.0
         bodies = grains([0.0, 0.0, RADIUS + 0.5 * step * speed], velocities=[0.0, 0.0, -speed])
-        worlds.append(world(bodies, contact, step, walls=(Plane(),)))
-    seen = record(solve(*worlds), 1100).velocities[:, :, 2]
+        setups.append(world(bodies, contact, step, walls=(Plane(),)))
+    seen = record(solve(*setups), 1100).velocities[:, :, 2]
     # Second order in the step, of which the steeper branch has 500 or more; measured: 3e-6.
     np.testing.assert_allclose(seen[-1] / speeds, math.sqrt(1.0 - plasticity), rtol=1e-5)
     assert (np.diff(seen, axis=0) >= 0.0).all()

@@ -11,6 +11,8 @@ import pytest
 
 import doe
 from doe import Factor, Goal, MeasuredCurve, Sample, Wish, plots
+from doe.discrepancy import Measured, Settings, settings_of
+from doe.errors import RuleError
 from doe.plots.joint_plots import joint_plot
 
 FACTORS = [Factor("A", 0.0, 1.0), Factor("B", 2.0, 5.0), Factor("C", -1.0, 1.0)]
@@ -237,12 +239,6 @@ def test_right_values_are_accepted(function: Callable) -> None:
     function(**right_values(function))
 
 
-@pytest.mark.parametrize("name", ["response", "error", "error_percent"])
-def test_a_factor_is_not_overwritten_by_a_column_of_the_climb(name: str) -> None:
-    with pytest.raises(doe.DesignError, match=f"'{name}' names a column"):
-        doe.climb_table(doe.plackett_burman([Factor(name, 0.0, 1.0)], 4), np.arange(4.0), 1.0)
-
-
 def test_plain_calls_are_accepted() -> None:
     """Integers, lists, Series in another order and numbers of other kinds are read as they are."""
     shuffled = pd.Series(RESPONSE, index=DESIGN.coded.index).sample(frac=1.0, random_state=1)
@@ -252,3 +248,113 @@ def test_plain_calls_are_accepted() -> None:
     assert doe.compare_means([1, 2, 4], (2, 3)).df > 0.0
     assert SURFACE.predict({**POINT, "A": 3}, alpha=np.float64(0.1)).notna().all(axis=None)
     assert doe.climb_table(PATH, VALUES, 0.0)["error_percent"].isna().all()
+
+
+VARIETY = doe.Category("variety", ["old", "new", "wild"])
+SPEEDS = [Factor(name, 0.0, 10.0) for name in ("v0", "v1", "v2")]
+TWELVE = [Factor(f"x{number}", 0.0, 1.0) for number in range(12)]
+BLENDED, ROW, NAN = pd.DataFrame({"a": [0.5], "b": [0.6]}), [[20.0, 1.0]], np.array([[np.nan]])
+
+
+def fraction(*generators: str) -> doe.Design:
+    return doe.fractional_factorial(TWELVE[:5], generators=generators)
+
+
+def square(*runs: int) -> doe.Surface:
+    return doe.fit_surface(doe.central_composite(FACTORS[:2]).select(runs), np.arange(float(len(runs))))
+
+
+def climb(name: str) -> pd.DataFrame:
+    return doe.climb_table(doe.plackett_burman([Factor(name, 0.0, 1.0)], 4), np.arange(4.0), 1.0)
+
+
+def measured(rows: list[list[float]], *reasons: str) -> Measured:
+    return Measured(
+        ("base",), ("angle", "height"), {"base": np.array(rows)}, {"base": reasons} if reasons else {}
+    )
+
+
+DESIGNS = [
+    (lambda: doe.fractional_factorial(TWELVE, resolution=6), "no fraction of resolution 6 in 12 factors"),
+    (lambda: fraction("x3 = x0:x9"), "a generator must give one of"),
+    (lambda: fraction("x9 = x0:x1"), "a generator must give one of"),
+    (lambda: fraction("x0:x1"), "a generator must give one of"),
+    (lambda: fraction("x4 = x3:x0", "x3 = x0:x1"), "a generator must give one of"),
+    (lambda: doe.alias_structure(doe.box_behnken(FACTORS)), "factor 'A' is 0"),
+    (lambda: doe.join(CORNERS, doe.full_factorial(SPEEDS)), "same factors"),
+    (lambda: doe.sobol(SPEEDS, 12), "such as 8 or 16, got 12"),
+    (lambda: doe.optimal_design(SPEEDS, 12, constraints=["v0 > 11"]), "no candidate run keeps"),
+    (lambda: doe.optimal_design(SPEEDS, 12, constraints=["v9 > 11"]), "cannot be evaluated"),
+    (lambda: doe.optimal_design(SPEEDS, 12, constraints=["v0 == v1"]), "cannot distinguish 10 coefficients"),
+    (lambda: doe.central_composite([*FACTORS, VARIETY]), "'variety' is a category"),
+    (lambda: doe.box_behnken([*FACTORS, VARIETY]), "'variety' is a category"),
+    (lambda: doe.definitive_screening([*FACTORS, VARIETY]), "'variety' is a category"),
+    (lambda: doe.plackett_burman([VARIETY]), "category 'variety' has 3"),
+    (lambda: VARIETY.to_coded("tame"), "must be one of"),
+    (lambda: doe.power_table(CORNERS, model="three-factor"), "leave no degrees of freedom"),
+    (lambda: doe.Mixture(BLENDED, {}), "add up to 1"),
+    (lambda: doe.simplex_centroid(["a", "b"], lower={"a": 0.6, "b": 0.5}), "less than 1"),
+    (lambda: DESIGN.select([20]), "no run 20"),
+    (lambda: DESIGN.with_blocks(["a"]), "one label for each of 19 runs"),
+    (lambda: DESIGN.with_blocks([None] + ["a"] * 18), "run 1 has no block"),
+    (
+        lambda: doe.Design(DESIGN.factors, DESIGN.coded, blocks=BLOCKS.reset_index(drop=True)),
+        "by the runs' labels",
+    ),
+    (
+        lambda: doe.Design.from_table(DESIGN.points, FACTORS, coded=True, block="day"),
+        "no column for the block",
+    ),
+]
+ANALYSES = [
+    (lambda: square(1, 2, 3, 4, 9, 10, 11), r"cannot distinguish these terms: B\^2 with A\^2"),
+    (lambda: square(1, 2, 3, 5, 7, 9), "6 observations leave no residual for intercept, A, B"),
+    (lambda: doe.fit_mixture(BLENDS, EIGHT[:6], "cubic"), "model must be one of"),
+    (lambda: doe.two_level_effects(doe.full_factorial(FACTORS[:2]), EIGHT[:4]), "must be five or more"),
+    (lambda: doe.ridge_path(SURFACE, [-1.0]), "finite and not negative"),
+    (
+        lambda: doe.compare_means(VALUES, TARGET, method="one-sample"),
+        r"a known number, .*got Sample\(mean=9.0, sd=0.5, n=4\)",
+    ),
+    (lambda: Wish(0.0, -1.0), "low of a wish must be below high, got 0.0 and -1.0"),
+    (lambda: Wish(0.0, 10.0, target=20.0), "target must be between 0.0 and 10.0, got 20.0"),
+    (lambda: Wish(0.0, 10.0, weight=0.0), "weight of a wish must be positive and finite, got 0.0"),
+    (lambda: Wish(0.0, 10.0, weight=(1.0, 2.0)), "weight without target must be one number, got"),
+    (lambda: Wish(0.0, 10.0, importance=-1.0), "importance of a wish must be positive"),
+    (lambda: climb("response"), "'response' names a column"),
+    (lambda: climb("error"), "'error' names a column"),
+    (lambda: climb("error_percent"), "'error_percent' names a column"),
+]
+RULES = [
+    (lambda: doe.CurveEmulator.of(np.zeros((4, 2)), np.zeros((4, 5))), "must be 6 or more"),
+    (lambda: doe.CurveEmulator.of(np.zeros((8, 2)), np.zeros((7, 5))), "must have a row for each run"),
+    (lambda: doe.CurveEmulator.of(np.zeros((8, 2)), np.full((8, 5), np.nan)), "must be finite"),
+    (lambda: doe.fit_curves({}, [0.0], [], 1.0, 1), "must have at least one measured curve"),
+    (lambda: doe.ProfileSample.of(np.zeros((2, 9))), r"profiles: must be 3 rows or more, got shape \(2, 9\)"),
+    (lambda: doe.ProfileSample.of(np.zeros(9)), "profiles: must be 3 rows or more"),
+    (lambda: doe.ProfileSample.of(np.ones((4, 9))), "profiles: must scatter, got the same profile each time"),
+    (lambda: doe.ProfileSample.of(np.vstack([np.ones((3, 1)), NAN])), r"profiles\[3\]: must be finite"),
+    (lambda: measured([[20.0]]), "2 columns, one per observable"),
+    (lambda: measured([[20.0, np.inf]]), "infinite"),
+    (lambda: measured(ROW, "", ""), "one entry per replicate"),
+    (lambda: measured(ROW, "lost"), "failed"),
+    (lambda: measured(ROW).only(["r50"]), "must name measured observables"),
+    (lambda: Settings(false_alarm=0.0), "false_alarm: must be between 0 and 1"),
+    (lambda: Settings(bank_repeats=1), "bank_repeats: must be a whole number of at least 2"),
+    (lambda: Settings(bank_points=24.5), "bank_points: must be a whole number"),
+    (lambda: Settings(bank_points=10**9), "bank_points: must be .* at most 100,000"),
+    (lambda: Settings(tie_margin=-1.0), "tie_margin: must not be negative"),
+    (
+        lambda: settings_of({"tie_margn": 3.0}, "a.json"),
+        r"a\.json: must be one of .*tie_margin.*, got tie_margn",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "build", "message"),
+    [*((doe.DesignError, *case) for case in DESIGNS + ANALYSES), *((RuleError, *case) for case in RULES)],
+)
+def test_what_breaks_a_rule_is_refused_with_it(kind: type, build: Callable, message: str) -> None:
+    with pytest.raises(kind, match=message):
+        build()

@@ -3,11 +3,9 @@
 from functools import cache
 
 import numpy as np
-import pytest
 from scipy.stats import qmc
 
 from doe import CurveEmulator, CurveFit, MeasuredCurve, fit_curves
-from doe.errors import RuleError
 
 PLACES = np.linspace(-40.0, 40.0, 41)
 SPEEDS = {"slow": np.log(15.0), "between": np.log(30.0), "fast": np.log(45.0)}
@@ -51,19 +49,6 @@ def test_an_emulator_meets_curves_that_it_has_not_seen():
     assert np.mean(np.abs(expected - true) < 3.0 * np.sqrt(variance) + 1e-3) > 0.9
 
 
-@pytest.mark.parametrize(
-    ("points", "curves", "rule"),
-    [
-        (np.zeros((4, 2)), np.zeros((4, 5)), "must be 6 or more"),
-        (np.zeros((8, 2)), np.zeros((7, 5)), "must have a row for each run"),
-        (np.zeros((8, 2)), np.full((8, 5), np.nan), "must be finite"),
-    ],
-)
-def test_curves_that_tell_nothing_are_refused(points, curves, rule):
-    with pytest.raises(RuleError, match=rule):
-        CurveEmulator.of(points, curves)
-
-
 def test_the_compatible_settings_hold_the_truth():
     truth = np.array([0.3, -0.4])
     found = fitted(truth)
@@ -98,8 +83,3 @@ def test_a_forecast_holds_what_was_not_measured():
         assert (made.expected > made.low).all()
     # bands hold a reading, whose error is left out here: more than their level of the true curves
     assert np.mean(inside) > 0.9
-
-
-def test_no_curve_is_no_fit():
-    with pytest.raises(RuleError, match="must have at least one measured curve"):
-        fit_curves(emulators(), PLACES, [], READING, seed=1)

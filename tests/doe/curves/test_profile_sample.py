@@ -6,7 +6,6 @@ from scipy import stats
 
 import doe
 from doe import Factor, Goal, ProfileSample, Sample, central_composite, fit_surface, joint_fit
-from doe.errors import RuleError
 
 PLACES = np.linspace(-1.0, 1.0, 9)
 
@@ -47,20 +46,6 @@ def test_many_profiles_give_their_covariance_and_few_a_shrunk_one() -> None:
     assert np.mean(shrunk) < 0.9 * np.mean(plain)
     # Five rows span four directions of nine; shrinkage leaves no direction without a scatter.
     assert min(np.linalg.eigvalsh(ProfileSample.of(each).covariance)[0] for each in rows) > 0.0
-
-
-@pytest.mark.parametrize(
-    ("profiles", "message"),
-    [
-        (np.zeros((2, 9)), r"profiles: must be 3 rows or more, got shape \(2, 9\)"),
-        (np.zeros(9), r"profiles: must be 3 rows or more"),
-        (np.ones((4, 9)), r"profiles: must scatter, got the same profile each time"),
-        (np.vstack([np.ones((3, 2)), [[1.0, np.nan]]]), r"profiles\[3\]: must be finite"),
-    ],
-)
-def test_profiles_that_tell_nothing_are_refused(profiles: np.ndarray, message: str) -> None:
-    with pytest.raises(RuleError, match=message):
-        ProfileSample.of(profiles)
 
 
 FACTORS = (Factor("friction", 0.1, 0.9), Factor("rolling", 0.0, 0.4))

@@ -1,4 +1,4 @@
-"""Designs: published tables, resolution, orthogonality, optimality, and what is refused."""
+"""Designs: published tables, resolution, orthogonality, optimality."""
 
 import itertools
 
@@ -8,7 +8,6 @@ import pytest
 
 import doe
 from doe import DesignError, Factor, alias_structure, fractional_factorial, full_factorial, optimal_design
-from doe.design.families.mixture import Mixture
 
 # Word lengths of the catalogue's first designs (Chen, Sun and Wu 1993): resolution by runs and factors.
 RESOLUTIONS = {
@@ -36,8 +35,6 @@ def test_fractions_have_the_published_resolution(runs, count, resolution):
 def test_fraction_of_a_resolution_is_the_smallest():
     sizes = [len(fractional_factorial(factors(7), resolution=r).coded) for r in (3, 4, 5, 7)]
     assert sizes == [8, 16, 64, 64]
-    with pytest.raises(DesignError, match="no fraction of resolution 6 in 12 factors"):
-        fractional_factorial(factors(12), resolution=6)
 
 
 def test_generators_and_their_aliases_in_words():
@@ -46,9 +43,6 @@ def test_generators_and_their_aliases_in_words():
     assert "Resolution III" in text
     assert "-x1:x2:x4, x1:x3:x5" in text
     assert "Inseparable: x1 = -x2:x4 = x3:x5" in text
-    for bad in (["x4 = x1:x9"], ["x9 = x1:x2"], ["x1:x2"], ["x5 = x4:x1", "x4 = x1:x2"]):
-        with pytest.raises(DesignError, match="a generator must give one of"):
-            fractional_factorial(factors(5), generators=bad)
 
 
 def test_partial_aliases_of_plackett_burman():
@@ -56,8 +50,6 @@ def test_partial_aliases_of_plackett_burman():
     assert structure.resolution == pytest.approx(3.0 + 2.0 / 3.0)
     assert structure.chains == []
     assert structure.of("x1:x2").abs().max() == pytest.approx(1.0 / 3.0)
-    with pytest.raises(DesignError, match="factor 'x1' is 0"):
-        alias_structure(doe.box_behnken(factors(3)))
 
 
 @pytest.mark.parametrize(
@@ -129,8 +121,6 @@ def test_joined_designs_keep_the_first_coding():
     both = doe.join(first, second, blocks=["old", "new"])
     assert both.natural["a"].to_list() == [0.0, 2.0, 2.0, 6.0]
     assert both.coded["a"].to_list() == [-1.0, 1.0, 1.0, 5.0]
-    with pytest.raises(DesignError, match="same factors"):
-        doe.join(first, full_factorial([Factor("b", 0.0, 2.0)]))
 
 
 def test_center_runs_show_curvature_in_a_screening():
@@ -149,11 +139,9 @@ def test_latin_hypercube_has_one_run_in_every_slice():
     pd.testing.assert_frame_equal(design.coded, doe.latin_hypercube(factors(3), 20, seed=4).coded)
 
 
-def test_sobol_is_balanced_and_refuses_other_sizes():
+def test_sobol_is_balanced():
     design = doe.sobol(factors(4), 16)
     assert (np.sort(np.floor((design.coded.to_numpy() + 1.0) * 8.0), axis=0) == np.arange(16)[:, None]).all()
-    with pytest.raises(DesignError, match="such as 8 or 16, got 12"):
-        doe.sobol(factors(4), 12)
 
 
 def test_optimal_designs_are_the_known_ones():
@@ -177,12 +165,6 @@ def test_constraints_are_kept():
     design = optimal_design(speeds, 12, constraints=rules, levels=7)
     natural = design.natural
     assert ((natural["v0"] < natural["v1"]) & (natural["v1"] < natural["v2"]) & (natural["v2"] < 9.9)).all()
-    with pytest.raises(DesignError, match="no candidate run keeps"):
-        optimal_design(speeds, 12, constraints=["v0 > 11"])
-    with pytest.raises(DesignError, match="cannot be evaluated"):
-        optimal_design(speeds, 12, constraints=["v9 > 11"])
-    with pytest.raises(DesignError, match="cannot distinguish 10 coefficients"):
-        optimal_design(speeds, 12, constraints=["v0 == v1"])
 
 
 def test_optimal_design_adds_to_what_ran():
@@ -202,13 +184,6 @@ def test_categories_enter_where_the_design_allows():
     assert doe.Category("kind", ["a", "b"]).to_natural(-1.0) == "a"
     two = doe.plackett_burman([*factors(3), doe.Category("kind", ["a", "b"])])
     assert set(two.natural["kind"]) == {"a", "b"}
-    for refused in (doe.central_composite, doe.box_behnken, doe.definitive_screening):
-        with pytest.raises(DesignError, match="'variety' is a category"):
-            refused([*factors(3), variety])
-    with pytest.raises(DesignError, match="category 'variety' has 3"):
-        doe.plackett_burman([variety])
-    with pytest.raises(DesignError, match="must be one of"):
-        variety.to_coded("tame")
 
 
 def test_power_is_that_of_a_balanced_effect():
@@ -217,8 +192,6 @@ def test_power_is_that_of_a_balanced_effect():
     assert (table["vif"] == 1.0).all()
     assert table["df"].iloc[0] == 12
     assert table["power at 2"].to_numpy() == pytest.approx(doe.effect_power(2.0, 0.8, 16, 12), rel=1e-12)
-    with pytest.raises(DesignError, match="leave no degrees of freedom"):
-        doe.power_table(design, model="three-factor")
 
 
 def test_mixtures():
@@ -227,7 +200,3 @@ def test_mixtures():
     design = doe.simplex_lattice(list("abc"), 2, interior=True, lower={"a": 0.1, "b": 0.2})
     assert design.shares.sum(axis=1).to_numpy() == pytest.approx(1.0)
     assert design.shares.min().to_list() == pytest.approx([0.1, 0.2, 0.0])
-    with pytest.raises(DesignError, match="add up to 1"):
-        Mixture(pd.DataFrame({"a": [0.5], "b": [0.6]}), {})
-    with pytest.raises(DesignError, match="less than 1"):
-        doe.simplex_centroid(list("ab"), lower={"a": 0.6, "b": 0.5})

@@ -1,10 +1,8 @@
-"""Measured data as arrays: means and covariances over what was measured, and what is refused."""
+"""Measured data as arrays: means and covariances over what was measured."""
 
 import numpy as np
-import pytest
 
 from doe.discrepancy import Measured
-from doe.errors import RuleError
 
 NAN = np.nan
 NAMES = ("flank_angle", "height")
@@ -42,22 +40,3 @@ def test_fewer_observables_leave_the_rest_as_it_is() -> None:
     assert data.observables == ("height",)
     assert data.notes == ("a note",)
     np.testing.assert_array_equal(data.values["base"], [[1.0], [2.0]])
-
-
-@pytest.mark.parametrize(
-    ("rows", "more", "message"),
-    [
-        ([[20.0]], {}, "2 columns, one per observable"),
-        ([[20.0, np.inf]], {}, "infinite"),
-        ([[20.0, 1.0]], {"reasons": {"base": ("", "")}}, "one entry per replicate"),
-        ([[20.0, 1.0]], {"reasons": {"base": ("lost",)}}, "failed"),
-    ],
-)
-def test_tables_that_contradict_themselves_are_refused(rows, more, message) -> None:
-    with pytest.raises(RuleError, match=message):
-        measured(rows, **more)
-
-
-def test_an_unmeasured_subset_is_refused() -> None:
-    with pytest.raises(RuleError, match="must name measured observables"):
-        measured([[20.0, 1.0]]).only(["r50"])

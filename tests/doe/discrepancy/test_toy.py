@@ -9,21 +9,7 @@ import numpy as np
 import pytest
 
 from doe import discrepancy
-from doe.discrepancy import (
-    Discovery,
-    Measured,
-    MechanismRange,
-    Outcomes,
-    Point,
-    SearchSpace,
-    Settings,
-    Verdict,
-    analyse,
-    bank_points,
-    drive,
-    fit_emulator,
-    make_bank,
-)
+from doe.discrepancy import Discovery, Measured, MechanismRange, Outcomes, Point, SearchSpace, Settings, drive
 
 OBSERVABLES = ("rise", "peak", "width", "tail", "area")
 SPACE = SearchSpace(
@@ -58,8 +44,8 @@ def simulate(points: Sequence[Point]) -> Outcomes:
 
 
 def analysed(sizes: Mapping[str, float], seed: int = 3) -> Discovery:
-    points = bank_points(SPACE, SETTINGS)
-    emulator = fit_emulator(make_bank(SPACE, OBSERVABLES, points, simulate(points)))
+    points = discrepancy.bank_points(SPACE, SETTINGS)
+    emulator = discrepancy.fit_emulator(discrepancy.make_bank(SPACE, OBSERVABLES, points, simulate(points)))
     rng = np.random.default_rng(seed)
     measured = Measured(
         SPACE.conditions,
@@ -69,12 +55,12 @@ def analysed(sizes: Mapping[str, float], seed: int = 3) -> Discovery:
             for name in SPACE.conditions
         },
     )
-    return drive(analyse(measured, emulator, SETTINGS, seed), simulate)
+    return drive(discrepancy.analyse(measured, emulator, SETTINGS, seed), simulate)
 
 
 def test_a_hidden_mechanism_of_a_plain_function_is_named_with_its_size() -> None:
     found = analysed({"echo": 1.1})
-    assert found.verdict is Verdict.NAMED
+    assert found.verdict is discrepancy.Verdict.NAMED
     assert found.named == ("echo",)
     assert found.chosen is not None
     [size] = found.chosen.sizes

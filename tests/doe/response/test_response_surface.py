@@ -1,4 +1,4 @@
-"""Response surfaces: agreement with statsmodels formulas, invariances, reduction, prediction, refusals."""
+"""Response surfaces: agreement with statsmodels formulas, invariances, reduction, prediction."""
 
 import numpy as np
 import pandas as pd
@@ -103,12 +103,3 @@ def test_prediction_intervals_cover():
         ]
     # 3.5 binomial standard deviations of 80 trials: 0.085.
     assert hits / trials == pytest.approx(0.95, abs=3.5 * np.sqrt(0.95 * 0.05 / trials))
-
-
-def test_refuses_what_cannot_be_estimated():
-    design = central_composite(FACTORS[:2])
-    corners = design.select([1, 2, 3, 4, 9, 10, 11])
-    with pytest.raises(DesignError, match=r"cannot distinguish these terms: B\^2 with A\^2"):
-        fit_surface(corners, np.arange(7.0))
-    with pytest.raises(DesignError, match="6 observations leave no residual for intercept, A, B"):
-        fit_surface(design.select([1, 2, 3, 5, 7, 9]), np.arange(6.0))

@@ -1,7 +1,6 @@
-"""Analysis beyond the fit: shape, optima, desirability, diagnostics, formulas, effects, refusals."""
+"""Analysis beyond the fit: shape, optima, desirability, diagnostics, formulas, effects."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import doe
@@ -79,8 +78,6 @@ def test_ridge_path_beats_every_other_point_of_its_sphere():
         assert np.linalg.norm(up.filter(like="coded ").loc[radius]) == pytest.approx(radius, rel=1e-9)
         assert up["mean"][radius] >= values.max() - 1e-9
         assert down["mean"][radius] <= values.min() + 1e-9
-    with pytest.raises(DesignError, match="finite and not negative"):
-        ridge_path(surface, [-1.0])
 
 
 def test_region_of_the_optimum_covers_it():
@@ -120,16 +117,6 @@ def test_wishes_are_those_of_derringer_and_suich():
     assert up.of(values) == pytest.approx([0, 0, 0.4, 0.85, 1, 1])
     assert down.of(values) == pytest.approx([1, 1, 0.36, 0.0225, 0, 0])
     assert between.of(values) == pytest.approx([0, 0, 1, 0.5, 0, 0])
-    refused = [
-        {"high": -1.0},
-        {"target": 20.0},
-        {"weight": 0.0},
-        {"weight": (1.0, 2.0)},
-        {"importance": -1.0},
-    ]
-    for bad in refused:
-        with pytest.raises(DesignError):
-            Wish(**{"low": 0.0, "high": 10.0, **bad})
 
 
 def test_most_desirable_setting_is_that_of_a_fine_grid():
@@ -225,8 +212,6 @@ def test_scheffe_polynomial_returns_pure_blends():
     replicates = np.column_stack([truth + 1e-9, truth - 1e-9])
     fit = doe.fit_mixture(mixture, replicates)
     assert fit.coefficient_table["estimate"].to_numpy() == pytest.approx([3, 5, 0, 8, 0, 0], abs=1e-7)
-    with pytest.raises(DesignError, match="model must be one of"):
-        doe.fit_mixture(mixture, replicates, "cubic")
 
 
 def test_lenth_names_the_active_effects_of_a_saturated_fraction():
@@ -239,8 +224,6 @@ def test_lenth_names_the_active_effects_of_a_saturated_fraction():
     assert "b:d" in {name, *result.table.loc[name, "mixed with"].split(", ")}
     assert result.significant(0.05) == ["a", name]
     assert result.limit(together=True) > result.limit()
-    with pytest.raises(DesignError, match="must be five or more"):
-        doe.two_level_effects(doe.full_factorial(FACTORS), [1.0, 2.0, 3.0, 5.0])
 
 
 def test_summary_and_repr_can_be_read():
@@ -252,15 +235,3 @@ def test_summary_and_repr_can_be_read():
     assert repr(design) == "Design of 13 runs in a 0..2, b 10..20; 4 repeated settings"
     assert repr(surface).startswith("Surface in a, b, a:b, a^2, b^2: 13 observations, R2 0.9")
     assert "chosen by the data" in surface.reduce(1e-9).summary()
-
-
-def test_a_wrong_block_is_refused():
-    design, _ = drawn()
-    with pytest.raises(DesignError, match="one label for each of 13 runs"):
-        design.with_blocks(["a"])
-    with pytest.raises(DesignError, match="run 1 has no block"):
-        design.with_blocks([None] + ["a"] * 12)
-    with pytest.raises(DesignError, match="by the runs' labels"):
-        Design(design.factors, design.coded, blocks=pd.Series(["a"] * 13))
-    with pytest.raises(DesignError, match="no column for the block"):
-        Design.from_table(design.points, design.factors, coded=True, block="day")
