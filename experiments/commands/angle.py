@@ -21,6 +21,19 @@ if TYPE_CHECKING:
 ANGLE_EXAMPLE = "Example: [bold]dem-warp angle photos/*.jpg --fit middle --overlay measured[/]"
 
 
+HeapUnit = Annotated[
+    str | None, typer.Option(help="Unit of length in files of spheres. Default: the file's own, or m.")
+]
+PlateHeight = Annotated[
+    str | None,
+    typer.Option(metavar="LENGTH", help='Plate height in files of spheres, e.g. "2 mm". Default: found.'),
+]
+GrainTypes = Annotated[
+    str | None,
+    typer.Option("--type", help="Types that are grain in files of spheres, e.g. 1 or 1,3. Default: all."),
+]
+
+
 def angle(
     pictures: Annotated[
         list[Path],
@@ -53,13 +66,9 @@ def angle(
     distance: Annotated[
         float | None, typer.Option(help="Distance of the camera from the heap, in widths of the heap.")
     ] = None,
-    unit: Annotated[
-        str | None, typer.Option(help="Unit of length in files of spheres. Default: the file's own, or m.")
-    ] = None,
-    plate_height: Annotated[
-        str | None,
-        typer.Option(metavar="LENGTH", help='Plate height in files of spheres, e.g. "2 mm". Default: found.'),
-    ] = None,
+    unit: HeapUnit = None,
+    plate_height: PlateHeight = None,
+    types: GrainTypes = None,
     as_target: Annotated[bool, typer.Option("--target", help="Print a study's \\[target] section.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print the rows as CSV.")] = False,
     as_json: AsJson = False,
@@ -85,7 +94,8 @@ def angle(
 
         pictures = photographs.expanded(pictures)
         _require_one_form({"--target": as_target, "--csv": as_csv, "--json": as_json})
-        view, heaps = _view(crop, plate, heap_number, elevation, distance), heap_settings(unit, plate_height)
+        view = _view(crop, plate, heap_number, elevation, distance)
+        heaps = heap_settings(unit, plate_height, types)
         options = photographs.PictureOptions(fit, view, heaps, by, keep_doubtful)
         if as_target:
             photographs.require_separate(pictures, options, "--target")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.grains.spheres import format_of, length_unit, read_spheres
+from experiments.grains.spheres import SphereFile, format_of, length_unit, read_spheres
 from experiments.grains.spheres.clump_file import unit_option
 from experiments.io.errors import InputError
 from experiments.io.units import read_quantity
 from experiments.studyfile.study import MeasurementSection
-from imaging import Doubt, HeapAngle, ReposeAngle, heap_angle, overlay, snapshot
-from imaging.drawing.ground import find_ground
+from imaging import Doubt, HeapAngle, PictureError, ReposeAngle, heap_angle, overlay, snapshot
+from imaging.drawing.ground import REST, find_ground
 from imaging.geometry import Picture, Spheres
 from imaging.photo.doubts import GREATEST_ANGLE, LEAST_ANGLE, ROUGH_EDGE
 
@@ -25,6 +26,9 @@ DEFAULT_UNIT = "m"
 """Unit of a heap's file without a unit; angles do not depend on it."""
 BELOW = 0.5
 """Depth under the plate, in radii, of a sphere that fell off it."""
+LEAST_PLANE, PLANE = 20, 0.9
+"""Fewest spheres with exactly the same coordinate that are mentioned, and their least share of those within
+`REST`: of equal grains on a plate of LIGGGHTS, LAMMPS and Yade, half have one depth in six digits."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class HeapSettings:
     """Unit of length [m]; None: the file's own, or metres."""
     plate_height: float | None = None
     """Height of the plate [m]; None: it is found."""
+    types: tuple[str, ...] = ()
+    """Types of the spheres that are grain; empty: all."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +60,12 @@ class MeasuredHeap:
         return overlay(clean, self.angle.views[0]), clean.image
 
 
-def heap_settings(unit: str | None, plate_height: str | None) -> HeapSettings:
+def heap_settings(unit: str | None, plate_height: str | None, types: str | None = None) -> HeapSettings:
     """Read the options of files of heaps; raise `InputError` for an invalid unit or height."""
     size = None if unit is None else unit_option(unit)
     height = None if plate_height is None else read_quantity(plate_height, "length", "--plate-height")
-    return HeapSettings(size, height)
+    names = (name.strip() for name in (types or "").split(","))
+    return HeapSettings(size, height, tuple(name for name in names if name))
 
 
 @lru_cache(maxsize=1024)
@@ -69,7 +76,35 @@ def is_heap_file(path: Path) -> bool:
 
 def measure_heap_file(path: Path, fit: str, settings: HeapSettings) -> MeasuredHeap:
     """Measure the repose angle of the heap in a file of spheres; raise `PictureError` without a heap."""
-    file = read_spheres(path)
+    whole = read_spheres(path)
+    file, notes = whole.of_types(settings.types, f"{path}, --type"), _notes(whole, settings)
+    try:
+        return _measured(file, path, fit, settings, notes)
+    except PictureError as error:
+        raise PictureError(str(path), "; ".join((str(error), *notes))) from None
+
+
+def _notes(file: SphereFile, settings: HeapSettings) -> list[str]:
+    """Mention several types, and spheres in one plane, which may be no grain."""
+    counts = file.type_counts
+    listed = ", ".join(f"{name} ({count} spheres)" for name, count in counts.items())
+    kept = f"only {', '.join(settings.types)} measured" if settings.types else "all measured; --type chooses"
+    notes = [f"types: {listed}; {kept}"] if len(counts) > 1 else []
+    file = file.of_types(settings.types, "")
+    for axis, name in enumerate("xyz"):
+        along = file.spheres[:, axis]
+        [(place, many)] = Counter(along.tolist()).most_common(1)
+        near = np.count_nonzero(np.abs(along - place) < REST * np.median(file.spheres[:, 3]))
+        if many >= LEAST_PLANE and many > PLANE * near:
+            inside = file.chosen(along == place).type_counts
+            of_type = f" of type {', '.join(inside)}" if inside else ""
+            notes.append(f"{many} spheres{of_type} have the same {name}, {place:.4g}: a floor or a wall?")
+    return notes
+
+
+def _measured(
+    file: SphereFile, path: Path, fit: str, settings: HeapSettings, notes: Iterable[str]
+) -> MeasuredHeap:
     if settings.unit is not None and file.unit is not None and settings.unit != file.unit:
         problem = f"must be the unit of the file, {file.unit:g} m"
         raise InputError(f"{path}, --unit", problem, f"{settings.unit:g} m")
@@ -91,7 +126,7 @@ def measure_heap_file(path: Path, fit: str, settings: HeapSettings) -> MeasuredH
     ]
     if fallen := int(np.count_nonzero(~standing)):
         parts.append(f"{fallen} below it left out")
-    return MeasuredHeap(angle, "; ".join(parts), heap)
+    return MeasuredHeap(angle, "; ".join((*parts, *notes)), heap)
 
 
 def _span(radii: np.ndarray) -> str:

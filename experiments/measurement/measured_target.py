@@ -81,7 +81,9 @@ def _with_pictures(study: Study, place: str) -> tuple[Study, tuple[str, ...]]:
     sample = target_sample(rows, options, place)
     names = [Path(row["picture"]).name for row in used_rows(rows, options)]
     note = f"{len(names)} pictures: {', '.join(names)}"
-    return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), left_out_notes(rows, options)
+    read = [f"{row['picture']}: {row['source']}" for row in rows if row["source"] != "photograph"]
+    target = _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note)
+    return target, (*read, *left_out_notes(rows, options))
 
 
 def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path: Path) -> Replicated | None:
@@ -101,6 +103,7 @@ def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path
 
 
 def _options(study: Study) -> PictureOptions:
+    from experiments.measurement.heap_files import HeapSettings
     from experiments.measurement.photographs import PictureOptions
     from imaging import View
 
@@ -108,7 +111,8 @@ def _options(study: Study) -> PictureOptions:
     if section is None:
         return PictureOptions(fit)
     view = section.view.view if section.view else View()
-    return PictureOptions(fit, view, by=section.by, keep_doubtful=section.keep_doubtful)
+    heaps = HeapSettings(types=tuple(map(str, section.types)))
+    return PictureOptions(fit, view, heaps, section.by, section.keep_doubtful)
 
 
 def find_pictured(study: Study) -> list[Path]:

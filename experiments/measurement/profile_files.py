@@ -1,7 +1,8 @@
 """Files of measured profiles: heights of a drum's surface or a heap's outline, as a tidy CSV.
 
 A row is a point, ``replicate, x, z`` with units, or, for a heap, ``replicate, picture, pixel``: a photograph,
-or a file of spheres of another code. The column ``view`` numbers views of a heap, or frames of a drum.
+or a file of spheres of another code, whose grain may be given by its ``type``. The column ``view`` numbers
+views of a heap, or frames of a drum.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from experiments.measurement.duplicates import Duplicates
 from experiments.measurement.value_limits import ValueLimits
 from imaging import PictureError
 
-COLUMNS = ("replicate", "view", "x", "z", "picture", "pixel")
+COLUMNS = ("replicate", "view", "x", "z", "picture", "pixel", "type")
 """Columns of a file of profiles."""
 
 LEAST_STATIONS = 3
@@ -193,7 +194,7 @@ def _outline(view: _Points, place: str, size: ValueLimits) -> np.ndarray:
 def _pictured(row: Row, fit: str, size: ValueLimits) -> Iterator[np.ndarray]:
     """Yield the heights of the outlines of a photograph, or of a file of spheres from all sides."""
     # a file of points needs no pictures
-    from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file
+    from experiments.measurement.heap_files import heap_settings, is_heap_file, measure_heap_file
     from imaging import find_outline, heap_profile, heap_shape, measure, read_picture
 
     path, place = row.file.parent / row["picture"], row.place("picture")
@@ -201,7 +202,7 @@ def _pictured(row: Row, fit: str, size: ValueLimits) -> Iterator[np.ndarray]:
         raise row.error(f"no such file: {path}", "picture")
     try:
         if is_heap_file(path):
-            heap = measure_heap_file(path, fit, HeapSettings())
+            heap = measure_heap_file(path, fit, heap_settings(None, None, row["type"]))
             height = max(heap_shape(view.outline).height for view in heap.angle.views)
             size.require_height(height, "Check its unit of length.", f" in {row['picture']}", place)
             yield from (heap_profile(view.outline) for view in heap.angle.views)

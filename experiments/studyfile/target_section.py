@@ -25,7 +25,7 @@ MEASUREMENTS = ("mean", "sd", "n")
 SOURCES = ("pictures", "file", "profiles")
 """Keys of ``[target]`` that name where the measurements are taken from."""
 
-PICTURE_OPTIONS = ("by", "keep_doubtful", "view")
+PICTURE_OPTIONS = ("by", "keep_doubtful", "types", "view")
 """Keys of ``[target]`` that belong to its pictures."""
 
 Grouping = Literal["picture", "folder"]
@@ -159,6 +159,8 @@ class TargetSection(ResponseSection):
     """Pictures of one heap: each picture is another heap, or each folder is one heap."""
     keep_doubtful: bool = False
     """True: doubtful pictures count."""
+    types: tuple[int | str, ...] = ()
+    """Types of the spheres that are grain, in files of spheres instead of photographs. Default: all."""
     view: ViewSection | None = None
     """Known facts of the photographs."""
     file: str | None = None

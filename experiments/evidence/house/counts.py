@@ -216,7 +216,7 @@ def counts() -> list[Count]:
     own, statistics, pictures = (imports_between_rooms(name) for name in ("experiments", "doe", "imaging"))
     data = [name for name in tracked() if not name.endswith((".py", ".pyi"))]
     return [
-        Count("experiments without evidence, lines", lines(product), 28_000),
+        Count("experiments without evidence, lines", lines(product), 28_102),
         Count("experiments, folders without evidence", len(rooms), 15),
         Count("experiments, floors", max(heights(own).values()), 10),
         Count("experiments, imports between rooms", len(own), 65),

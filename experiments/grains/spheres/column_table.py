@@ -17,6 +17,7 @@ import numpy as np
 
 from experiments.grains.spheres.sphere_file import (
     LARGEST,
+    TYPES,
     Columns,
     Format,
     Row,
@@ -42,6 +43,7 @@ _NAMES = {
     "r": rf"{_SIZE}(?:radius|radii|r)",
     "d": rf"{_SIZE}(?:diameter|d)",
     "body": "clumpid|idmultisphere|mol|grain|owner|particleid|clump",
+    "type": "|".join(TYPES),
 }
 SHEET_UNIT, SHEET_SHAPE = "unit", "shape"
 """Columns of a sheet of ``dem-warp export``: the unit, and the sphere's shape."""
@@ -84,7 +86,8 @@ def _read(path: Path) -> SphereFile:
     kinds = [column_kind(name) for name in names]
     size = "r" if "r" in kinds else "d"
     x, y, z, r = (kinds.index(kind) for kind in ("x", "y", "z", size))
-    columns = Columns(x, y, z, r, size == "d", kinds.index("body") if "body" in kinds else None)
+    body, types = (kinds.index(kind) if kind in kinds else None for kind in ("body", "type"))
+    columns = Columns(x, y, z, r, size == "d", body, types)
     rows: Iterable[Row] = ((n, split(line, delimiter)) for n, line in content_lines(text) if n > header)
     sizes = [_unit_of(names[column], f"{path}, line {header}") for column in columns.needed()[:4]]
     if SHEET_UNIT in names:
@@ -92,16 +95,16 @@ def _read(path: Path) -> SphereFile:
         sizes = [_unit_of_rows(rows, names.index(SHEET_UNIT), path)] * 4
         if columns.body is None and SHEET_SHAPE in names:
             columns = replace(columns, body=names.index(SHEET_SHAPE))
-    spheres, bodies = spheres_of(rows, columns, path, delimiter)
     description = f"table of spheres ({', '.join(names[column] for column in columns.needed())})"
+    read = spheres_of(description, rows, columns, path, delimiter)
     if not any(sizes):
-        return SphereFile(description, spheres, bodies)
+        return read
     if not all(sizes):
         problem = "either all of x, y, z and radius must have a unit, or none of them"
         raise InputError(f"{path}, line {header}", problem, ", ".join(names))
     if len(set(sizes)) == 1:
-        return SphereFile(description, spheres, bodies, unit=sizes[0])
-    return SphereFile(description, spheres * np.array(sizes, dtype=np.float64), bodies, unit=1.0)
+        return replace(read, unit=sizes[0])
+    return replace(read, spheres=read.spheres * np.array(sizes, dtype=np.float64), unit=1.0)
 
 
 def _unit_of_rows(rows: Iterable[Row], column: int, path: Path) -> float:

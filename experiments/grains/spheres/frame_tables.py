@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from experiments.grains.spheres.sphere_file import LARGEST, Columns, Format, SphereFile, spheres_of
+from experiments.grains.spheres.sphere_file import LARGEST, TYPES, Columns, Format, SphereFile, spheres_of
 from experiments.io.errors import InputError
 from experiments.io.texts import is_number, read_text
 
@@ -37,8 +37,8 @@ def _columns_of(line: str, path: Path) -> Columns:
     size = next((name for name in ("radius", "radii", "diameter") if name in at), None)
     if "pos" not in at or size is None:
         raise InputError(f"{path}, line 2", "needs the properties pos and radius (or diameter)", line.strip())
-    x = at["pos"]
-    return Columns(x, x + 1, x + 2, at[size], is_diameter=size == "diameter")
+    x, types = at["pos"], next((at[name] for name in TYPES if name in at), None)
+    return Columns(x, x + 1, x + 2, at[size], is_diameter=size == "diameter", type=types)
 
 
 def _last_frame(path: Path, heads: int) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -57,12 +57,13 @@ def _last_frame(path: Path, heads: int) -> tuple[list[str], list[tuple[int, list
 
 def _read_xyz(path: Path) -> SphereFile:
     heads, rows = _last_frame(path, 2)
-    return SphereFile("extended XYZ, the last frame", spheres_of(rows, _columns_of(heads[1], path), path)[0])
+    return spheres_of("extended XYZ, the last frame", rows, _columns_of(heads[1], path), path)
 
 
 def _read_mercury(path: Path) -> SphereFile:
     _, rows = _last_frame(path, 1)
-    return SphereFile("data of MercuryDPM, the last frame", spheres_of(rows, Columns(0, 1, 2, 6), path)[0])
+    columns = Columns(0, 1, 2, 6, type=MERCURY_ROW - 1)
+    return spheres_of("data of MercuryDPM, the last frame", rows, columns, path)
 
 
 XYZ = Format("extended XYZ", _is_xyz, _read_xyz)

@@ -7,7 +7,7 @@ parts of the box.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -84,17 +84,16 @@ def _read(path: Path) -> SphereFile:
     place = f"{path}, line {chosen.first_row - 1}"
     lengths, scaled = _columns(chosen.columns, place)
     rows = ((chosen.first_row + n, row.split()) for n, row in enumerate(chosen.items["ATOMS"]))
-    spheres, bodies = spheres_of(rows, lengths, path)
-    if scaled:
-        low, high = _box(chosen, f"{path}, line {chosen.line}")
-        spheres[:, :3] = low + spheres[:, :3] * (high - low)
-    if bodies is not None and len(np.unique(bodies)) == 1 and bodies[0] == 0:
-        bodies = None
     description = f"LIGGGHTS or LAMMPS dump, frame {position} of {count} (timestep {chosen.step})"
     if chosen is not last:
         description += ", the last complete one"
+    read = spheres_of(description, rows, lengths, path)
+    if scaled:
+        low, high = _box(chosen, f"{path}, line {chosen.line}")
+        read.spheres[:, :3] = low + read.spheres[:, :3] * (high - low)
     unit = UNITS_OF.get(next(iter(chosen.items.get("UNITS", [])), "").strip())
-    return SphereFile(description, spheres, bodies, unit)
+    alone = read.bodies is not None and not read.bodies.any()
+    return replace(read, bodies=None if alone else read.bodies, unit=unit)
 
 
 def _columns(names: list[str], place: str) -> tuple[Columns, bool]:
@@ -106,7 +105,8 @@ def _columns(names: list[str], place: str) -> tuple[Columns, bool]:
         raise InputError(place, problem, " ".join(names) or "no columns")
     x, y, z = (names.index(axis + start[1:]) for axis in "xyz")
     body = next((names.index(name) for name in BODIES if name in names), None)
-    return Columns(x, y, z, names.index(size), size == "diameter", body), start in ("xs", "xsu")
+    types = names.index("type") if "type" in names else None
+    return Columns(x, y, z, names.index(size), size == "diameter", body, types), start in ("xs", "xsu")
 
 
 def _box(frame: _Frame, place: str) -> tuple[np.ndarray, np.ndarray]:

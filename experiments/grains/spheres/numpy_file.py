@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.grains.spheres.sphere_file import Columns, Format, SphereFile, spheres_of
+from experiments.grains.spheres.sphere_file import TYPES, Columns, Format, SphereFile, spheres_of
 from experiments.io.errors import InputError
 
 CENTERS, RADII = ("centers", "centres", "position", "positions", "xyz"), ("radius", "radii", "r")
@@ -33,8 +33,15 @@ def _read(path: Path) -> SphereFile:
         raise InputError(
             str(path), f"needs arrays {CENTERS[0]} (n, 3) and {RADII[0]} (n), or one table (n, 4)", shapes
         )
-    rows = ((n, [repr(float(value)) for value in row]) for n, row in enumerate(table))
-    return SphereFile("NumPy file", spheres_of(rows, Columns(0, 1, 2, 3), path, kind="row")[0])
+    types = next((arrays[name] for name in TYPES if name in arrays), None)
+    if types is not None and np.shape(types) != table.shape[:1]:
+        raise InputError(str(path), "needs a type for each sphere", f"{np.shape(types)} for {len(table)}")
+    rows = (
+        (n, [*(repr(float(value)) for value in row), "" if types is None else str(types[n])])
+        for n, row in enumerate(table)
+    )
+    columns = Columns(0, 1, 2, 3, type=None if types is None else 4)
+    return spheres_of("NumPy file", rows, columns, path, kind="row")
 
 
 NUMPY = Format(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from experiments.grains.spheres.sphere_file import (
@@ -41,9 +42,9 @@ def _read(path: Path) -> SphereFile:
     for number, cells in rows:
         if len(cells) != 4:
             raise InputError(f"{path}, line {number}", SPHERE_RULE, " ".join(cells))
-    spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3), path, delimiter)
     description = "spheres (x y z r, as in multisphere templates of LIGGGHTS)"
-    return SphereFile(description, spheres, unit=_named_unit(text))
+    read = spheres_of(description, rows, Columns(0, 1, 2, 3), path, delimiter)
+    return replace(read, unit=_named_unit(text))
 
 
 def _named_unit(text: str) -> float | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,8 @@ from experiments.io.texts import is_number, number
 
 SPHERE_RULE = "a sphere must be x y z r: four finite numbers, r > 0"
 
+TYPES = ("type", "types", "atomtype", "particletype", "speciestype", "species", "matid", "materialid")
+"""Names of a type's column or array, in lower case without marks."""
 LARGEST = 500_000_000
 """Size of the largest file of spheres that is read [bytes]: frames of a heap of millions."""
 
@@ -30,11 +32,33 @@ class SphereFile:
     """Number of each sphere's body, shape (n,); None where the file has no bodies."""
     unit: float | None = None
     """Size of its unit of length [m]; None where the file has no unit."""
+    types: NDArray[np.str_] | None = None
+    """Type of each sphere (material, species), shape (n,); None where the file has no types."""
 
     @property
     def body_count(self) -> int:
         """Number of bodies; without bodies, each sphere is one."""
         return len(self.spheres) if self.bodies is None else len(np.unique(self.bodies))
+
+    @property
+    def type_counts(self) -> dict[str, int]:
+        """Number of spheres of each type, in the order of names; empty without types."""
+        names, counts = np.unique([] if self.types is None else self.types, return_counts=True)
+        return {str(name): int(count) for name, count in zip(names, counts, strict=True)}
+
+    def chosen(self, kept: NDArray[np.bool_]) -> SphereFile:
+        """Return the file with some of its spheres (n,) only."""
+        bodies = None if self.bodies is None else self.bodies[kept]
+        types = None if self.types is None else self.types[kept]
+        return replace(self, spheres=self.spheres[kept], bodies=bodies, types=types)
+
+    def of_types(self, types: Collection[str], place: str) -> SphereFile:
+        """Return the file with the spheres of some types only; raise `InputError` for an unknown one."""
+        known = self.type_counts
+        if unknown := [name for name in types if name not in known]:
+            listed = ", ".join(f"{name} ({count} spheres)" for name, count in known.items())
+            raise InputError(place, f"must be a type of the file: {listed or 'it has none'}", unknown[0])
+        return self.chosen(np.isin(self.types, list(types))) if self.types is not None and types else self
 
 
 @dataclass(frozen=True)
@@ -61,9 +85,11 @@ class Columns:
     """True where `r` is the column of the diameter."""
     body: int | None = None
     """Column of the body's number."""
+    type: int | None = None
+    """Column of the type."""
 
     def needed(self) -> tuple[int, ...]:
-        """Return the columns that are read."""
+        """Return the columns of numbers that are read."""
         return (self.x, self.y, self.z, self.r, *(() if self.body is None else (self.body,)))
 
 
@@ -72,25 +98,35 @@ Row = tuple[int, Sequence[str]]
 
 
 def spheres_of(
-    rows: Iterable[Row], columns: Columns, path: Path, delimiter: str | None = None, kind: str = "line"
-) -> tuple[NDArray[np.float64], NDArray[np.int64] | None]:
-    """Read rows of spheres; return centres and radii (n, 4) in the file's unit, and their bodies (n,).
-
-    Errors name a row by its `kind`.
-    """
+    description: str,
+    rows: Iterable[Row],
+    columns: Columns,
+    path: Path,
+    delimiter: str | None = None,
+    kind: str = "line",
+) -> SphereFile:
+    """Read rows of spheres with their bodies and types; errors name a row by its `kind`."""
     needed = columns.needed()
-    values = []
+    values, types = [], []
     for line, cells in rows:
         valid = len(cells) > max(needed) and all(is_number(cells[column], delimiter) for column in needed)
         row = [number(cells[column]) for column in needed] if valid else [np.nan] * 4
         if not np.isfinite(row).all() or row[3] <= 0.0:
             raise InputError(f"{path}, {kind} {line}", SPHERE_RULE, " ".join(cells))
         values.append(row)
+        if columns.type is not None:
+            types.append(_type_name(cells[columns.type]) if len(cells) > columns.type else "")
     if not values:
         raise InputError(str(path), "has no spheres (x y z r)")
     table = np.array(values)
     spheres = table[:, :4] * np.array([1.0, 1.0, 1.0, 0.5 if columns.is_diameter else 1.0])
-    return spheres, None if columns.body is None else own_bodies(table[:, 4])
+    bodies = None if columns.body is None else own_bodies(table[:, 4])
+    return SphereFile(description, spheres, bodies, types=np.array(types) if types else None)
+
+
+def _type_name(cell: str) -> str:
+    """Return the name of a type: 1 for 1.0, which tables of numbers have."""
+    return f"{number(cell):g}" if is_number(cell) else cell
 
 
 def own_bodies(numbers: NDArray[np.float64]) -> NDArray[np.int64]:

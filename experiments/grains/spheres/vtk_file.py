@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.grains.spheres.sphere_file import Columns, Format, SphereFile, own_bodies, spheres_of
+from experiments.grains.spheres.sphere_file import TYPES, Columns, Format, SphereFile, spheres_of
 from experiments.io.errors import InputError
 
 RADII, DIAMETERS = ("radius", "radii", "r"), ("diameter",)
@@ -39,11 +39,14 @@ def _read(path: Path) -> SphereFile:
         named = ", ".join(arrays.values()) or "none"
         raise InputError(str(path), f"the points need an array radius (or radii, diameter), not only {named}")
     table = np.column_stack([points, np.ravel(values[size])[: len(points)]]).astype(np.float64)
-    rows = ((n, [repr(float(value)) for value in row]) for n, row in enumerate(table))
-    spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3, size in DIAMETERS), path, kind="point")
-    body = next((name for name in BODIES if name in values), None)
-    bodies = None if body is None else own_bodies(values[body].astype(np.float64))
-    return SphereFile(f"VTK file, radii from the array {arrays[size]}", spheres, bodies)
+    body, kind = (next((name for name in names if name in values), None) for names in (BODIES, TYPES))
+    further = [np.ravel(values[name])[: len(points)] for name in (body, kind) if name is not None]
+    rows = (
+        (n, [repr(float(value)) for value in row]) for n, row in enumerate(np.column_stack([table, *further]))
+    )
+    at = [None if name is None else 4 for name in (body, kind)]
+    columns = Columns(0, 1, 2, 3, size in DIAMETERS, at[0], at[1] if body is None else at[1] and 5)
+    return spheres_of(f"VTK file, radii from the array {arrays[size]}", rows, columns, path, kind="point")
 
 
 def _last_grid(reader: Any) -> Any:

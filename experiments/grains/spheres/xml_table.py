@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -34,14 +35,13 @@ def _read(path: Path) -> SphereFile:
         raise InputError(str(path), "either all spheres must have a radius, or all a diameter")
     size = next(iter(sizes), "r")
     rows = ((n, [entries[kind] for kind in (*_NEEDED, size)]) for n, entries in enumerate(found, start=1))
-    spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3, is_diameter=size == "d"), path, kind="sphere")
+    columns, title = Columns(0, 1, 2, 3, is_diameter=size == "d"), "XML with an element for each sphere"
+    read = spheres_of(title, rows, columns, path, kind="sphere")
     named = {element.get(key) for element in root.iter() for key in ("unit", "units") if element.get(key)}
     lengths = [name for name in named if name in UNITS["length"]]
     if len(lengths) > 1:
         raise InputError(str(path), "must have only one unit of length", ", ".join(sorted(lengths)))
-    return SphereFile(
-        "XML with an element for each sphere", spheres, unit=UNITS["length"][lengths[0]] if lengths else None
-    )
+    return replace(read, unit=UNITS["length"][lengths[0]] if lengths else None)
 
 
 def _spheres(element: ElementTree.Element) -> Iterator[dict[str, str]]:

@@ -26,9 +26,9 @@ from experiments.io.texts import read_text
 _HEADER = "#format"
 LAYOUTS = {
     "x_y_z_r": Columns(0, 1, 2, 3),
-    "x_y_z_r_matId": Columns(0, 1, 2, 3),
+    "x_y_z_r_matId": Columns(0, 1, 2, 3, type=4),
     "x_y_z_r_attrs": Columns(0, 1, 2, 3),
-    "id_x_y_z_r_matId": Columns(1, 2, 3, 4),
+    "id_x_y_z_r_matId": Columns(1, 2, 3, 4, type=5),
     "x_y_z_r_clumpId": Columns(0, 1, 2, 3, body=4),
 }
 """Columns of each of Yade's formats."""
@@ -41,8 +41,7 @@ def _read_text(path: Path) -> SphereFile:
         problem = f"must be a format of Yade with spheres ({', '.join(LAYOUTS)})"
         raise InputError(f"{path}, line 1", problem, name)
     rows = ((number, line.split()) for number, line in content_lines(text))
-    spheres, bodies = spheres_of(rows, LAYOUTS[name], path)
-    return SphereFile(f"Yade's text format {name}", spheres, bodies)
+    return spheres_of(f"Yade's text format {name}", rows, LAYOUTS[name], path)
 
 
 def _read_template(path: Path) -> SphereFile:
@@ -72,8 +71,8 @@ def _read_template(path: Path) -> SphereFile:
         problem = "clumpTemplate needs a radius and a position (x, y, z) for each sphere"
         raise InputError(place, problem, f"shapes {radii.shape} and {centers.shape}")
     rows = ((call.lineno, [repr(float(value)) for value in row]) for row in np.column_stack([centers, radii]))
-    spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3), path)
-    return SphereFile("clump template of Yade (relative sizes: --unit is the size of 1)", spheres)
+    description = "clump template of Yade (relative sizes: --unit is the size of 1)"
+    return spheres_of(description, rows, Columns(0, 1, 2, 3), path)
 
 
 YADE_TEXT = Format("text of Yade", lambda head: head.startswith(_HEADER), _read_text)

@@ -217,3 +217,18 @@ def test_numbers_must_be_taken_before_a_target_is_read(from_source) -> None:
     study = from_source('pictures = "photos"')
     with pytest.raises(InputError, match="with_measurements must first"):
         study.target  # noqa: B018
+
+
+def test_a_target_of_heap_files_takes_the_types_that_are_grain(from_source, tmp_path: Path) -> None:
+    """Two heaps of LIGGGHTS' data of another test, with and without a wall of another type above."""
+    source = Path(__file__).parents[1] / "grains/spheres/data/yade_spheres.txt"
+    grains = np.loadtxt(source)[:, :4]
+    for number in range(2):
+        heap = grains * (1.0 + 1e-3 * number)
+        rows = [(*row, 1) for row in heap] + [(0.0, 0.0, 0.08, 0.002 + 0.001 * number, 3)]
+        table = "x,y,z,r,type\n" + "".join("{:.7f},{:.7f},{:.7f},{:.7f},{}\n".format(*row) for row in rows)
+        (tmp_path / f"heap-{number}.csv").write_text(table, "utf-8")
+    study, notes = with_measurements(from_source('pictures = "heap-*.csv"\ntypes = [1]\nfit = "flank"'))
+    # the same heap, a thousandth larger
+    assert study.target.leading.measured.sd < 0.1
+    assert all("3 (1 spheres); only 1 measured" in note for note in notes[:2])

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista
 from commandline import dem_warp, refused
 from scipy.spatial import cKDTree
 
@@ -169,3 +170,66 @@ def test_blank_lines_take_no_longer_than_reading_them(tmp_path: Path) -> None:
     with suppress(InputError):
         read_spheres(tmp_path / "heap.txt")
     assert time.process_time() - started < 2.0
+
+
+def with_floor(folder: Path, floor_type: int) -> Path:
+    """Write the heap of LIGGGHTS on a floor of fixed spheres, which rests on the plate of the script."""
+    text = (DATA / "liggghts_spheres.dump").read_text("utf-8")
+    head, columns, rows = text.rpartition("ITEM: TIMESTEP")[2].rpartition("ITEM: ATOMS")
+    names, count = rows.partition("\n")[0].split(), 900
+    sides = np.linspace(-0.06, 0.06, 30)
+    for number, (x, y) in enumerate(np.array(np.meshgrid(sides, sides)).reshape(2, -1).T):
+        known = {"id": 5000 + number, "type": floor_type, "x": x, "y": y, "z": -0.004, "radius": 0.001}
+        rows += " ".join(str(known.get(name, 0)) for name in names) + "\n"
+    before = head.splitlines().index("ITEM: NUMBER OF ATOMS") + 1
+    lines = head.splitlines()
+    lines[before] = str(int(lines[before]) + count)
+    path = folder / "floor.dump"
+    path.write_text("ITEM: TIMESTEP" + "\n".join(lines) + "\n" + columns + rows, "utf-8")
+    return path
+
+
+def test_a_floor_of_another_type_is_mentioned_and_left_out_by_its_type(tmp_path: Path) -> None:
+    path = with_floor(tmp_path, 2)
+    [heap] = measured(DATA / "liggghts_spheres.dump")
+    [row] = measured(path, "--type", "1")
+    assert (row["mean"], row["se"]) == pytest.approx((heap["mean"], heap["se"]), abs=1e-9)
+    [row] = measured(path)
+    for part in ("2 (900 spheres)", "900 spheres of type 2 have the same z", "--type chooses"):
+        assert part in row["source"]
+    code, _, said = dem_warp("angle", path, "--type", "3")
+    assert code == 2
+    assert "must be a type of the file: 1 (278 spheres), 2 (900 spheres), got 3" in " ".join(said.split())
+
+
+def test_a_heap_of_one_type_without_a_floor_has_nothing_to_mention() -> None:
+    for name in ("liggghts_spheres.dump", "yade_clumps.txt", "yade-spheres.20000.vtu"):
+        [row] = measured(DATA / name)
+        assert "types:" not in row["source"]
+        assert "the same" not in row["source"]
+
+
+@pytest.mark.parametrize("name", ["t.csv", "t.xyz", "t.data", "t.npz", "t.vtp", "t.txt"])
+def test_types_are_read_from_every_format_that_has_them(name: str, tmp_path: Path) -> None:
+    path, types = tmp_path / name, [1, 2, 2]
+    spheres = [(0.0, 0.0, 1.0, 0.5, types[0]), (1.0, 0.0, 1.0, 0.5, types[1]), (0.0, 1.0, 1.0, 0.5, types[2])]
+    rows = {
+        "t.csv": "x,y,z,radius,type\n" + "".join("{},{},{},{},{}\n".format(*row) for row in spheres),
+        "t.xyz": "3\nProperties=pos:R:3:radius:R:1:species:S:1\n"
+        + "".join("{} {} {} {} {}\n".format(*row) for row in spheres),
+        "t.data": "3 0 0 0 0 1 1 1\n"
+        + "".join("{} {} {} 0 0 0 {} 0 0 0 0 0 0 {}\n".format(*r) for r in spheres),
+        "t.txt": "#format x_y_z_r_matId\n" + "".join("{} {} {} {} {}\n".format(*row) for row in spheres),
+    }
+    table = np.array(spheres)
+    if name == "t.npz":
+        np.savez(path, position=table[:, :3], radius=table[:, 3], type=table[:, 4])
+    elif name == "t.vtp":
+        cloud = pyvista.PolyData(table[:, :3])
+        cloud["radius"], cloud["type"] = table[:, 3], table[:, 4]
+        cloud.save(path)
+    else:
+        path.write_text(rows[name], "utf-8")
+    read = read_spheres(path)
+    assert read.type_counts == {"1": 1, "2": 2}
+    assert read.of_types(["2"], "").spheres[:, :2].tolist() == [[1.0, 0.0], [0.0, 1.0]]
