@@ -6,12 +6,11 @@ A field's type names its dimension; its bounds are the hard physical limits, for
 from __future__ import annotations
 
 import math
-import os
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, ShapeMixture, WallPart
 from dem_warp.laws.mechanism import check_forms
@@ -21,7 +20,7 @@ from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.proportions import narrowness
 from experiments.studyfile.scene_sections import SceneSection, scene_section
-from experiments.studyfile.schema import Generated, Length, Number, Section, nested_error
+from experiments.studyfile.schema import Generated, Length, Number, Section, StudyFile, nested_error
 from experiments.studyfile.sizes_section import SizesSection
 from experiments.studyfile.solver_section import SolverSection
 from experiments.studyfile.wall_sections import InteractionSection, MaterialSection, WallPartSection
@@ -44,23 +43,13 @@ class GrainCountError(ValueError):
 class ShapeSection(Section):
     """Source of a shape: a file of spheres, or the radius of one."""
 
-    clump: Path | None = None
+    clump: StudyFile | None = None
     """File with the clump's spheres, relative to the study file: x y z r a line, or a table, text or VTK file
     of LIGGGHTS, Yade, EDEM or DEM-Engine."""
     clump_unit: str | None = None
     """Unit of that file (mm, m, ...), or the length that is 1 in it. Default: the one it names, or mm."""
     sphere: Length | None = Field(default=None, gt=0.0)
     """Radius of spherical grains, instead of a clump."""
-
-    @field_validator("clump")
-    @classmethod
-    def _clump_exists(cls, clump: Path | None, info: ValidationInfo) -> Path | None:
-        if clump is None:
-            return None
-        path = Path((info.context or {}).get("folder", ".")) / clump
-        if not os.path.isfile(path):  # does not raise for a name that is too long
-            raise ValueError(f"no such clump file: {path}")
-        return path
 
     @field_validator("clump_unit")
     @classmethod

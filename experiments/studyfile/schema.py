@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     GetCoreSchemaHandler,
@@ -61,6 +64,13 @@ class Dimension:
         return core_schema.with_info_before_validator_function(self.read, handler(source))
 
 
+def _existing(path: Path, info: ValidationInfo) -> Path:
+    found = Path((info.context or {}).get("folder", ".")) / path
+    if not os.path.isfile(found):  # does not raise for a name that is too long
+        raise ValueError(f"no such file: {found}")
+    return found
+
+
 Number = Annotated[float, Dimension("")]
 Length = Annotated[float, Dimension("length")]
 Pressure = Annotated[float, Dimension("pressure")]
@@ -70,6 +80,8 @@ Angle = Annotated[float, Dimension("angle")]
 """A measured angle, in degrees."""
 RawQuantity = Annotated[Quantity, PlainValidator(Quantity.parse)]
 """A quantity of any dimension, kept as written."""
+StudyFile = Annotated[Path, AfterValidator(_existing)]
+"""A file, relative to the study file."""
 
 
 class Section(BaseModel):

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from dem_warp import ClumpShape, GrainPopulation, Material, SizeClasses
 from experiments.grains.sizes.diameters import DIAMETERS
 from experiments.grains.sizes.distribution import Continuous, Distribution
 from experiments.grains.sizes.size_classes import Classes, cut_classes
 from experiments.io.units import unit_size
-from experiments.studyfile.schema import Length, Number, Section
+from experiments.studyfile.schema import Length, Number, Section, StudyFile
 
 SOURCES = ("sieves", "counts", "distribution")
 """Keys of which a section has one."""
@@ -35,10 +34,10 @@ class SizesSection(Section):
     The clump or the sphere then says the shape alone: it is scaled to each size.
     """
 
-    sieves: Path | None = None
+    sieves: StudyFile | None = None
     """File of a sieve analysis, a CSV relative to the study: opening, and retained, retained_percent or
     passing_percent, the finest sieve first."""
-    counts: Path | None = None
+    counts: StudyFile | None = None
     """File of an image analyser, a CSV relative to the study: a diameter a grain, or from, to and count."""
     unit: str | None = None
     """Unit of the diameters of the file that have no unit, e.g. um."""
@@ -68,16 +67,6 @@ class SizesSection(Section):
     """Quantiles between which the grains are simulated; the report says how much mass is beyond them."""
     classes: int = Field(default=10, ge=1, le=50)
     """Classes of equal shares between the cuts, each of the size of its mean mass."""
-
-    @field_validator("sieves", "counts")
-    @classmethod
-    def _file_exists(cls, file: Path | None, info: ValidationInfo) -> Path | None:
-        if file is None:
-            return None
-        path = Path((info.context or {}).get("folder", ".")) / file
-        if not os.path.isfile(path):  # does not raise for a name that is too long
-            raise ValueError(f"no such file: {path}")
-        return path
 
     @field_validator("unit")
     @classmethod

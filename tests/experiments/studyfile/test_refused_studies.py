@@ -86,7 +86,7 @@ REFUSED = [
     changed('sphere = "2 mm"', "sphere = 2", "grain.sphere", "unit of length"),
     changed('sphere = "2 mm"', 'sphere = "-2 mm"', "grain.sphere", "greater than 0"),
     changed('sphere = "2 mm"', 'sphere = "wide"', "grain.sphere", "must be a number"),
-    changed('sphere = "2 mm"', 'clump = "none.txt"', "grain.clump", "no such clump file"),
+    changed('sphere = "2 mm"', 'clump = "none.txt"', "grain.clump", "no such file"),
     changed('sphere = "2 mm"', "", "grain", "needs a clump"),
     changed('sphere = "2 mm"', 'spere = "2 mm"', "grain.spere", "did you mean 'sphere'?"),
     changed(
@@ -121,7 +121,7 @@ REFUSED = [
     # Shapes and sizes
     shapes("fraction = 0.25", "fraction = 1.25", "grain.shapes.split.fraction", "less than or equal to 1"),
     shapes("fraction = 0.25", "fractoin = 0.25", "grain.shapes.split.fractoin", "did you mean 'fraction'?"),
-    shapes('"split.txt"', '"none.txt"', "grain.shapes.split.clump", "no such clump file"),
+    shapes('"split.txt"', '"none.txt"', "grain.shapes.split.clump", "no such file"),
     shapes('"split.txt"', '"split.txt"\nsphere = "1 mm"', "grain.shapes.split", "not both"),
     shapes("fraction = 0.25", "", "grain", "every shape but one needs its fraction"),
     shapes('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.7', "grain", "add up to 1"),
