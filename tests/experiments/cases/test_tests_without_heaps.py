@@ -16,9 +16,7 @@ from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.search import Search
 from experiments.export import ExportedTest
 from experiments.io.errors import InputError
-from experiments.measurement.measured_file import read_measured
-from experiments.measurement.measured_target import with_measurements
-from experiments.measurement.measured_template import write_measured_template
+from experiments.measurement import measured_file, measured_target, measured_template
 from experiments.studyfile import Study, load_study
 
 WriteStudy = Callable[..., Path]
@@ -60,7 +58,7 @@ def test_a_drum_is_searched_with_what_a_laboratory_measures_of_it(drum: Study, t
 
 
 def test_a_table_to_fill_in_has_the_observables_of_the_test(drum: Study, tmp_path: Path) -> None:
-    path = write_measured_template(drum, tmp_path)
+    path = measured_template.write_measured_template(drum, tmp_path)
     text = path.read_text(encoding="utf-8")
     assert all(f",{name}," in text for name in MEASURABLE)
     assert "flank_angle" not in text
@@ -68,7 +66,7 @@ def test_a_table_to_fill_in_has_the_observables_of_the_test(drum: Study, tmp_pat
     filled = text.replace("base,1,dynamic_angle,,deg", "base,1,dynamic_angle,31.5,deg")
     filled = filled.replace("base,2,fill_height,,mm", "base,2,fill_height,11,mm")
     path.write_text(filled, encoding="utf-8")
-    measured = read_measured(path, drum)
+    measured = measured_file.read_measured(path, drum)
     assert measured.observables == ("fill_height", "dynamic_angle")
     assert measured.only(["dynamic_angle"]).observables == ("dynamic_angle",)
 
@@ -89,14 +87,14 @@ def test_a_measurement_that_the_test_cannot_give_is_refused(
     path.write_text(f"condition,replicate,observable,value,unit,picture\n{row}\n", encoding="utf-8")
     (tmp_path / "drum.jpg").write_bytes(b"")
     with pytest.raises(InputError, match=message):
-        read_measured(path, drum)
+        measured_file.read_measured(path, drum)
 
 
 def test_a_file_of_measurements_is_the_target_of_a_drum(write_study: WriteStudy, tmp_path: Path) -> None:
     rows = "\n".join(f"base,{number},dynamic_angle,{angle},deg" for number, angle in enumerate((31, 33, 32)))
     (tmp_path / "m.csv").write_text(f"condition,replicate,observable,value,unit\n{rows}\n", encoding="utf-8")
     target = '[target]\nobservable = "dynamic_angle"\nfile = "m.csv"\n'
-    study, _ = with_measurements(load_study(write_study((TUBE, DRUM), (ANGLE, target))))
+    study, _ = measured_target.with_measurements(load_study(write_study((TUBE, DRUM), (ANGLE, target))))
     leading = study.target.leading
     assert (leading.observable, leading.unit) == ("dynamic_angle", "deg")
     assert (leading.measured.mean, leading.measured.sd, leading.measured.n) == (32.0, 1.0, 3)
@@ -105,7 +103,7 @@ def test_a_file_of_measurements_is_the_target_of_a_drum(write_study: WriteStudy,
 def test_photographs_of_heaps_are_no_target_of_a_drum(write_study: WriteStudy) -> None:
     path = write_study((TUBE, DRUM), (ANGLE, '[target]\npictures = "photos"\n'))
     with pytest.raises(InputError, match=r"target\.pictures: .*leaves no heap.*got drum"):
-        with_measurements(load_study(path))
+        measured_target.with_measurements(load_study(path))
 
 
 SEVERAL = """

@@ -10,15 +10,13 @@ import pytest
 import pyvista
 from commandline import dem_warp, refused
 
-from experiments.cli import app
+from experiments import cli, runs, studyfile
 from experiments.commands.console import CaseProgress, describe_progress, duration
-from experiments.runs import calibration as run
-from experiments.studyfile import load_study
 from imaging import save_picture
 
 WriteStudy = Callable[..., Path]
 
-COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
+COMMANDS = [command.callback.__name__ for command in cli.app.registered_commands if command.callback]
 
 
 def triangle(slope: float = 0.5) -> np.ndarray:
@@ -45,7 +43,7 @@ def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run, "run_campaign", interrupt)
+    monkeypatch.setattr(runs.calibration, "run_campaign", interrupt)
     path = write_study()
     options = ("--out", "my results", "--scale", "stiff", "--device", "cpu", "--workers", 2)
     code, _, err = dem_warp("calibrate", path, *options, "--json")
@@ -62,7 +60,7 @@ def test_a_small_real_heap_is_simulated_and_written(write_study: WriteStudy) -> 
     heap = json.loads(out)
     assert heap == json.loads(Path("one/angle.json").read_text(encoding="utf-8"))
     assert (heap["settings"], heap["seed"], heap["status"]) == ({"E": 0.5}, 3, "finished")
-    assert heap["provenance"]["study"] == load_study(path).sha256
+    assert heap["provenance"]["study"] == studyfile.load_study(path).sha256
     assert heap["observables"]["grain_count"] == 30
     views = [0.5 * (view["left"] + view["right"]) for view in heap["views"]]
     assert heap["angle"]["mean"] == pytest.approx(np.mean(views), rel=1e-12)

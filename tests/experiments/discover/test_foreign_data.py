@@ -14,17 +14,7 @@ import pytest
 from emulated import EmulatedSimulator, emulated_heaps
 from scipy import stats
 
-from doe.discrepancy import (
-    Bank,
-    BeforeAfter,
-    Calibration,
-    Emulator,
-    Interval,
-    Measured,
-    Verdict,
-    drive,
-    fit_emulator,
-)
+from doe import discrepancy
 from doe.discrepancy.contest.gap import OF_THE_BASE, find_gap
 from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import signatures
@@ -53,44 +43,44 @@ def search() -> Search:
 
 
 @cache
-def bank() -> Bank:
+def bank() -> discrepancy.Bank:
     return search().read_bank(TRIAL.with_name("bank-bench.npz"))
 
 
 @cache
-def known() -> Emulator:
-    return fit_emulator(bank())
+def known() -> discrepancy.Emulator:
+    return discrepancy.fit_emulator(bank())
 
 
 def theta(seed: int) -> np.ndarray:
     return np.random.default_rng([seed, 7]).uniform(-0.9, 0.9, len(known().space.factors))
 
 
-def heaps(coded: Mapping[str, float], seed: int) -> Measured:
+def heaps(coded: Mapping[str, float], seed: int) -> discrepancy.Measured:
     space = known().space
     sizes = {name: space.natural_size(name, size) for name, size in coded.items()}
     simulator = EmulatedSimulator(known())
     return emulated_heaps(simulator, tuple(space.natural_theta(theta(seed))), sizes, REPLICATES, seed)
 
 
-def with_reading_errors(measured: Measured, deviations: float, seed: int) -> Measured:
+def with_reading_errors(measured: discrepancy.Measured, deviations: float, seed: int) -> discrepancy.Measured:
     """Add a number of standard deviations of one run to each value."""
     rng = np.random.default_rng([seed, 8])
     values = {}
     for condition, rows in measured.values.items():
         sd = np.sqrt(known().surfaces[condition].noise.variance(theta(seed)))
         values[condition] = rows + deviations * sd * rng.standard_normal(rows.shape)
-    return Measured(measured.conditions, measured.observables, values)
+    return discrepancy.Measured(measured.conditions, measured.observables, values)
 
 
-def fitted(measured: Measured, *mechanisms: str) -> Fitted:
+def fitted(measured: discrepancy.Measured, *mechanisms: str) -> Fitted:
     """Fit the base with these mechanisms to the training conditions."""
     evidence = gather(measured, known())
     model = Model(known(), mechanisms, SYSTEMATIC, views=evidence.views)
     return fit(Stack(model, evidence.training))
 
 
-def base_p(measured: Measured) -> float:
+def base_p(measured: discrepancy.Measured) -> float:
     """Return the p value of the gap of the calibrated base, with which an analysis begins."""
     evidence = gather(measured, known())
     base = fit(Stack(Model(known(), (), SYSTEMATIC), evidence.training))
@@ -111,7 +101,10 @@ def test_scatter_of_heaps_is_separated_from_errors_of_reading() -> None:
         quiet = heaps({}, seed)
         centred = {name: rows - quiet.mean(name) for name, rows in quiet.values.items()}
         wide = {name: quiet.mean(name) + 2.0 * rows for name, rows in centred.items()}
-        for measured, errors in ((Measured(quiet.conditions, quiet.observables, wide), 0.0), (quiet, 2.0)):
+        for measured, errors in (
+            (discrepancy.Measured(quiet.conditions, quiet.observables, wide), 0.0),
+            (quiet, 2.0),
+        ):
             evidence = gather(with_reading_errors(measured, errors, seed), known())
             model = Model(known(), (), SYSTEMATIC)
             excess = model.excess(theta(seed), evidence.training[0].scatter)
@@ -171,7 +164,7 @@ def test_an_interval_holds_its_size_even_where_nothing_fits() -> None:
         assert low <= found.coded_sizes[0] <= high
 
 
-def shifted(measured: Measured, observable: str, offset: float) -> Measured:
+def shifted(measured: discrepancy.Measured, observable: str, offset: float) -> discrepancy.Measured:
     """Move all values of an observable alike."""
     moved = offset * (np.array(measured.observables) == observable)
     return replace(measured, values={name: rows + moved for name, rows in measured.values.items()})
@@ -183,7 +176,7 @@ def test_a_common_error_is_allowed_where_the_file_states_it() -> None:
     for seed in range(6):
         measured = shifted(heaps({}, seed), "t55", late)
         for stated in alarms:
-            calibration = {"t55": Calibration(late)} if stated else {}
+            calibration = {"t55": discrepancy.Calibration(late)} if stated else {}
             alarms[stated] += base_p(replace(measured, calibration=calibration)) < 0.025
     assert alarms[True] <= stats.binom.isf(1e-3, 6, 0.025)
     assert alarms[False] >= 4
@@ -198,7 +191,7 @@ def test_a_calibration_error_hides_no_effect_that_looks_otherwise() -> None:
 
 def test_the_record_says_how_much_of_an_allowance_a_model_uses() -> None:
     late = 0.02
-    measured = replace(shifted(heaps({}, 1), "t55", late), calibration={"t55": Calibration(late)})
+    measured = replace(shifted(heaps({}, 1), "t55", late), calibration={"t55": discrepancy.Calibration(late)})
     [used] = calibration_uses(fitted(measured), gather(measured, known()))
     assert (used.observable, used.offset, used.scale) == ("t55", late, 0.0)
     # Its error is that of five means of eight, of 11 ms a run, and what the prior draws: some 2 ms and 1.
@@ -220,7 +213,7 @@ def test_lengths_of_one_instrument_are_off_by_one_scale() -> None:
             for name, rows in whole.values.items()
         }
         for instrument in ("pictures", ""):
-            scale = Calibration(scale=share, instrument=instrument)
+            scale = discrepancy.Calibration(scale=share, instrument=instrument)
             measured = replace(whole, values=values, calibration=dict.fromkeys(lengths, scale))
             uses = calibration_uses(fitted(measured), gather(measured, known()))
             used[several, instrument] = [one.used_scale for one in uses]
@@ -236,7 +229,7 @@ def test_lengths_of_one_instrument_are_off_by_one_scale() -> None:
 def test_a_forecast_takes_over_what_the_fit_shows_to_be_off() -> None:
     measured = shifted(heaps({}, 2), "t55", 0.03)
     missed = []
-    for calibration in ({}, {"t55": Calibration(0.03)}):
+    for calibration in ({}, {"t55": discrepancy.Calibration(0.03)}):
         stated = replace(measured, calibration=calibration)
         held_out = gather(stated, known()).held_out
         found = forecast(fitted(stated), held_out)
@@ -246,10 +239,10 @@ def test_a_forecast_takes_over_what_the_fit_shows_to_be_off() -> None:
 
 
 def test_fresh_runs_that_come_out_worse_withdraw_a_name() -> None:
-    named = Conclusion(Verdict.NAMED, ("plate_tilt",), "", 0)
-    for worse, verdict in ((3.0, Verdict.NAMED), (5.0, Verdict.UNKNOWN)):
-        before, after = Interval(8.0, 10.0, 12.0), Interval(8.0, 10.0 + worse, 18.0)
-        compared = BeforeAfter(True, 12, before, after, Interval(-1.0, -0.5, 0.0), 8)
+    named = Conclusion(discrepancy.Verdict.NAMED, ("plate_tilt",), "", 0)
+    for worse, verdict in ((3.0, discrepancy.Verdict.NAMED), (5.0, discrepancy.Verdict.UNKNOWN)):
+        before, after = discrepancy.Interval(8.0, 10.0, 12.0), discrepancy.Interval(8.0, 10.0 + worse, 18.0)
+        compared = discrepancy.BeforeAfter(True, 12, before, after, discrepancy.Interval(-1.0, -0.5, 0.0), 8)
         assert withdrawn(named, [compared]).verdict is verdict
 
 
@@ -272,7 +265,7 @@ def test_without_a_tilt_every_lean_is_noise() -> None:
                 np.testing.assert_array_equal(np.delete(correlation, lean), 0.0)
 
 
-def seen_from(measured: Measured, cosine: float) -> Measured:
+def seen_from(measured: discrepancy.Measured, cosine: float) -> discrepancy.Measured:
     """Return heaps seen by a camera elsewhere: their mean leans by the cosine of the azimuth."""
     lean = measured.observables.index("asymmetry")
     values = {name: rows.copy() for name, rows in measured.values.items()}
@@ -324,7 +317,7 @@ def test_a_camera_of_the_study_mirrors_the_lean_of_its_condition(tmp_path: Path)
 
 
 def test_the_same_heaps_from_behind_are_named_with_their_direction() -> None:
-    found = drive(
+    found = discrepancy.drive(
         search().analysis(seen_from(heaps({"plate_tilt": 0.8}, 4), -1.0), bank(), seed=1),
         EmulatedSimulator(known()),
     )

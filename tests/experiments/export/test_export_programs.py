@@ -13,15 +13,7 @@ import pytest
 from exported_lift import GRAIN, exported_lift
 
 from dem_warp import Case, ClumpShape
-from experiments.export import (
-    EXPORTERS,
-    ExportedTest,
-    Translation,
-    contacts_of,
-    export_input,
-    values,
-    write_export,
-)
+from experiments import export
 from experiments.export.deme_exporter import obj_text, thick_tube
 from experiments.export.same_rain import template
 
@@ -30,18 +22,18 @@ PROGRAMS = {"yade": "yade", "deme": "deme"}
 """Codes driven by Python, and the laws that they have."""
 
 
-def exported(laws: str, **changes: Any) -> ExportedTest:
+def exported(laws: str, **changes: Any) -> export.ExportedTest:
     """Return a small lifted cylinder in the laws of a code."""
     return exported_lift(laws, CLUMP, **{"diameter": 0.02, "height": 0.03, "grain_count": 40} | changes)
 
 
 @pytest.fixture(scope="module")
-def inputs() -> dict[str, Translation]:
-    return {code: export_input(exported(laws), code) for code, laws in PROGRAMS.items()}
+def inputs() -> dict[str, export.Translation]:
+    return {code: export.export_input(exported(laws), code) for code, laws in PROGRAMS.items()}
 
 
 @pytest.mark.parametrize("code", PROGRAMS)
-def test_the_rain_is_ours_grain_by_grain(code: str, inputs: dict[str, Translation]) -> None:
+def test_the_rain_is_ours_grain_by_grain(code: str, inputs: dict[str, export.Translation]) -> None:
     rows = np.genfromtxt(io.StringIO(inputs[code].files["rain.csv"]), delimiter=",", names=True)
     case = exported(PROGRAMS[code]).case
     [world] = case.scene.prepare([case], "cpu")
@@ -56,7 +48,7 @@ def test_the_rain_is_ours_grain_by_grain(code: str, inputs: dict[str, Translatio
 
 
 @pytest.mark.parametrize("code", PROGRAMS)
-def test_mass_and_inertia_are_those_of_the_union(code: str, inputs: dict[str, Translation]) -> None:
+def test_mass_and_inertia_are_those_of_the_union(code: str, inputs: dict[str, export.Translation]) -> None:
     written = json.loads(inputs[code].files["test.json"])
     assert written["masses"] == pytest.approx([GRAIN.density * CLUMP.volume])
     assert written["moments"][0] == pytest.approx(GRAIN.density * CLUMP.volume * CLUMP.inertia_over_mass)
@@ -67,9 +59,12 @@ def test_mass_and_inertia_are_those_of_the_union(code: str, inputs: dict[str, Tr
     ast.parse(inputs[code].files["lift.py"])
 
 
-def test_yade_gets_a_contact_for_every_pair(inputs: dict[str, Translation]) -> None:
+def test_yade_gets_a_contact_for_every_pair(inputs: dict[str, export.Translation]) -> None:
     written = json.loads(inputs["yade"].files["test.json"])
-    among, wall = (values(EXPORTERS["yade"].contact_terms(c)) for c in contacts_of(_case("yade"), 1e-3, 1e-5))
+    among, wall = (
+        export.values(export.EXPORTERS["yade"].contact_terms(c))
+        for c in export.contacts_of(_case("yade"), 1e-3, 1e-5)
+    )
     for found, terms in zip(written["contacts"], (among, wall, wall), strict=True):
         assert {name: found[name] for name in terms} == terms
     assert [found["maxBendPl"] for found in written["contacts"]] == [0.1, 0.2, 0.2]
@@ -84,8 +79,8 @@ def test_hertz_leaves_for_dem_engine_with_a_modulus_that_gives_its_force() -> No
     assert ratio == pytest.approx(math.sqrt(2.0))
 
 
-def _deme(laws: str) -> Translation:
-    return export_input(exported(laws), "deme", approximate=True)
+def _deme(laws: str) -> export.Translation:
+    return export.export_input(exported(laws), "deme", approximate=True)
 
 
 def _case(laws: str) -> Case[Any]:
@@ -112,15 +107,15 @@ def test_a_thick_tube_is_closed_and_faces_the_grains() -> None:
 
 def test_a_plate_with_an_end_leaves_as_triangles() -> None:
     for code, laws in PROGRAMS.items():
-        translation = export_input(exported(laws, plate_diameter=0.05), code)
+        translation = export.export_input(exported(laws, plate_diameter=0.05), code)
         written = json.loads(translation.files["test.json"])
         assert written["plate"], code
     assert "plate.obj" in translation.files
 
 
 def test_mercury_gets_springs_and_dashpots_that_come_to_ours() -> None:
-    contact = contacts_of(_case("edem"), 1e-3, 1e-5)[0]
-    terms, law = values(EXPORTERS["mercurydpm"].contact_terms(contact)), contact.coefficients
+    contact = export.contacts_of(_case("edem"), 1e-3, 1e-5)[0]
+    terms, law = export.values(export.EXPORTERS["mercurydpm"].contact_terms(contact)), contact.coefficients
     # its tangential spring is 2/3 x 8 G a, its dashpots root the mass with 4/3 E a and 8 G a
     assert 2.0 / 3.0 * terms["EffectiveShearModulus"] == pytest.approx(law.shear_modulus)
     assert terms["Dissipation"] * math.sqrt(4.0 / 3.0) == pytest.approx(law.damping * math.sqrt(2.0))
@@ -129,14 +124,14 @@ def test_mercury_gets_springs_and_dashpots_that_come_to_ours() -> None:
 
 
 def test_mercury_gets_every_number_that_its_driver_asks_for() -> None:
-    files = export_input(exported("edem"), "mercurydpm", approximate=True).files
+    files = export.export_input(exported("edem"), "mercurydpm", approximate=True).files
     asked = set(re.findall(r"test::(\w+)", files["lift.cpp"]))
     written = set(re.findall(r"(\w+)(?:\[\])*(?:\[3\])? = ", files["test.h"])) | {"Contact"}
     assert asked <= written
 
 
 @pytest.fixture
-def course(tmp_path: Any, monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Translation]) -> Any:
+def course(tmp_path: Any, monkeypatch: pytest.MonkeyPatch, inputs: dict[str, export.Translation]) -> Any:
     """Return a course as a program has it, of a tube that is filled to its rim."""
     for name, text in inputs["yade"].files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
@@ -181,8 +176,8 @@ def test_a_course_takes_out_what_falls_off_and_gives_up_in_time(course: Any) -> 
 @pytest.mark.program("yade")
 def test_yade_runs_the_program_and_leaves_every_grain(tmp_path: Any) -> None:
     test = exported("yade", grain_count=6, height=0.012)
-    translation = export_input(test, "yade")
-    write_export(test, "yade", translation, tmp_path)
+    translation = export.export_input(test, "yade")
+    export.write_export(test, "yade", translation, tmp_path)
     subprocess.run(translation.command, cwd=tmp_path, check=True, capture_output=True)
     rows = (tmp_path / translation.heap).read_text().split("radius mol\n")[1].splitlines()
     spheres = np.array([row.split() for row in rows], dtype=float)
@@ -199,5 +194,5 @@ def test_yade_runs_the_program_and_leaves_every_grain(tmp_path: Any) -> None:
 
 @pytest.mark.parametrize("code", PROGRAMS)
 def test_a_test_that_ends_in_time_does_so_there(code: str) -> None:
-    translation = export_input(exported(PROGRAMS[code], duration=1.5), code)
+    translation = export.export_input(exported(PROGRAMS[code], duration=1.5), code)
     assert json.loads(translation.files["test.json"])["phases"]["duration"] == 1.5

@@ -15,10 +15,7 @@ from dem_warp.solids import read_mesh
 from doe import DesignError
 from doe.discrepancy import load_bank
 from experiments.cases.store.outcome_table import OutcomeTable
-from experiments.io.errors import InputError, StudyError
-from experiments.io.rows import read_rows
-from experiments.io.toml_files import read_toml
-from experiments.io.units import Quantity
+from experiments.io import errors, rows, toml_files, units
 from experiments.measurement.measured_target import with_measurements
 from experiments.runs.choices import measured_study
 from experiments.studyfile import load_study
@@ -30,7 +27,7 @@ WriteStudy = Callable[..., Path]
 
 READERS: dict[str, Callable[[Path], object]] = {
     "a.toml": load_study,
-    "a.csv": lambda path: list(read_rows(path, [], ["a"])),
+    "a.csv": lambda path: list(rows.read_rows(path, [], ["a"])),
     "a.txt": ClumpShape.read,
     "a.stl": read_mesh,
     "a.png": read_picture,
@@ -67,7 +64,7 @@ def test_a_file_of_a_terabyte_is_not_read(tmp_path: Path, name: str) -> None:
 def test_a_long_number_is_no_quantity(text: str) -> None:
     started = time.process_time()
     with pytest.raises(ValueError, match="must be"):
-        Quantity.parse(text)
+        units.Quantity.parse(text)
     # a cubic search takes minutes
     assert time.process_time() - started < 0.1
 
@@ -88,7 +85,7 @@ def test_a_long_number_is_no_quantity(text: str) -> None:
 def test_an_excessive_study_is_refused(write_study: WriteStudy, line: str, said: str) -> None:
     measurement = "[measurement]\nazimuths = 2\npixels = 200\n"
     path = write_study((measurement, ""), ("[numerics]\nmodulus_scale = 400.0\n", ""), add=line)
-    with pytest.raises(StudyError, match=said):
+    with pytest.raises(errors.StudyError, match=said):
         load_study(path)
 
 
@@ -106,7 +103,7 @@ def test_a_case_that_no_memory_holds_is_refused_before_it_is_made(
     height = ('height = "28 mm"\n', "" if "height" in new else 'height = "28 mm"\n')
     study = load_study(write_study(height, ("grain_count = 30", new)))
     for refused in (lambda: study.case({}, 1), lambda: measured_study(study)):
-        with pytest.raises(StudyError, match=f"at most {most} grains") as caught:
+        with pytest.raises(errors.StudyError, match=f"at most {most} grains") as caught:
             refused()
         [problem] = caught.value.problems
         assert problem.place.endswith(key)
@@ -119,7 +116,7 @@ def test_the_place_of_too_many_grains_is_that_of_the_condition_that_asks_for_the
 ) -> None:
     condition = "\n[condition.large]\nscene.lifted-cylinder.grain_count = 130_000_000\n"
     study = load_study(write_study(add=condition))
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(errors.StudyError) as caught:
         study.case({}, 1, "large")
     assert caught.value.place.endswith(": condition.large.scene.lifted-cylinder.grain_count")
 
@@ -178,8 +175,8 @@ def test_toml_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     for content in (b"a = \x00", "a = 1\u2028= 2\x0b".encode()):
         path.write_bytes(content)
-        with pytest.raises(InputError):
-            read_toml(path)
+        with pytest.raises(errors.InputError):
+            toml_files.read_toml(path)
 
 
 @pytest.mark.parametrize(
@@ -194,12 +191,12 @@ def test_names_and_integers_beyond_the_machine_are_refused(
     write_study: WriteStudy, old: str, new: str
 ) -> None:
     path = write_study((old, new))
-    with pytest.raises(InputError):
+    with pytest.raises(errors.InputError):
         with_measurements(load_study(path))
 
 
 @pytest.mark.parametrize("sizes", ["size_sd = 1e308", "size_mean = 1e-200\nsize_sd = 0.0"])
 def test_sizes_whose_cubes_are_no_numbers_are_refused(write_study: WriteStudy, sizes: str) -> None:
     path = write_study(('sphere = "2 mm"', f'sphere = "2 mm"\nsize_mean_of = "masses"\n{sizes}'))
-    with pytest.raises(StudyError, match=r"size_(sd|mean): .*(less|greater) than or equal to"):
+    with pytest.raises(errors.StudyError, match=r"size_(sd|mean): .*(less|greater) than or equal to"):
         load_study(path)

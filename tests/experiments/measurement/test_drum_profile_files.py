@@ -8,9 +8,7 @@ import pytest
 from small_study import ANGLE, TUBE
 
 from experiments.io.errors import InputError, StudyError
-from experiments.measurement.measured_target import with_measurements
-from experiments.measurement.profile_files import read_drum_profiles
-from experiments.measurement.profile_responses import with_profiles
+from experiments.measurement import measured_target, profile_files, profile_responses
 from experiments.studyfile import load_study
 
 DRUM = '[scene.drum]\ndiameter = "60 mm"\nlength = "20 mm"\nrotation_rate = "30 1/min"\n'
@@ -25,7 +23,7 @@ def file(folder: Path, text: str) -> Path:
 
 
 def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None:
-    _, kept, heights, _ = read_drum_profiles(file(tmp_path, LINE), 0.03)
+    _, kept, heights, _ = profile_files.read_drum_profiles(file(tmp_path, LINE), 0.03)
     assert kept == [1, 2, 3, 4, 5, 6, 7]
     places = np.array([-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8])[kept] * 0.03
     assert heights[0] == pytest.approx(-0.5 * places, abs=1e-12)
@@ -53,7 +51,7 @@ def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None
 )
 def test_a_bad_profile_is_refused_with_its_row(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        read_drum_profiles(file(tmp_path, text), 0.03)
+        profile_files.read_drum_profiles(file(tmp_path, text), 0.03)
 
 
 def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
@@ -64,7 +62,7 @@ def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
     with pytest.raises(
         InputError, match=r"p.csv: replicate: needs profiles of 3 or more replicates, got 1: 1"
     ):
-        with_profiles(study)
+        profile_responses.with_profiles(study)
     with pytest.raises(StudyError, match="with_measurements must first"):
         _ = study.target
 
@@ -78,8 +76,8 @@ def test_a_slope_beside_profiles_of_the_same_test_is_told(
     file(tmp_path, "".join(rows))
     slope = '[[response]]\nobservable = "dynamic_angle"\nmean = "30 deg"\nsd = "1 deg"\nn = 5\n'
     alone, both = (load_study(write_study((TUBE, DRUM), (ANGLE, TARGET), add=add)) for add in ("", slope))
-    assert with_measurements(alone)[1] == ()
-    assert with_measurements(both)[1] == (
+    assert measured_target.with_measurements(alone)[1] == ()
+    assert measured_target.with_measurements(both)[1] == (
         "dynamic_angle counts twice if it was read from the profiles of the same test",
     )
 
@@ -87,15 +85,15 @@ def test_a_slope_beside_profiles_of_the_same_test_is_told(
 def test_profiles_of_another_test_or_observable_are_refused(write_study: Callable[..., Path]) -> None:
     bare = load_study(write_study((ANGLE, '[target]\nobservable = "outline"\n')))
     with pytest.raises(InputError, match=r'"outline" needs profiles, a file of them, or a twin'):
-        with_profiles(bare)
+        profile_responses.with_profiles(bare)
     heap = load_study(write_study((ANGLE, TARGET)))
     with pytest.raises(InputError, match=r'the "surface" of a drum .*, got surface of lifted-cylinder'):
-        with_profiles(heap)
+        profile_responses.with_profiles(heap)
     other = load_study(write_study((TUBE, DRUM), (ANGLE, TARGET.replace('"surface"', '"mass_angle"'))))
     with pytest.raises(
         InputError, match=r'profiles need the observable "surface" or "outline", got mass_angle'
     ):
-        with_profiles(other)
+        profile_responses.with_profiles(other)
 
 
 @pytest.mark.parametrize(

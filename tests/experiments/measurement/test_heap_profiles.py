@@ -16,15 +16,13 @@ from experiments.measurement.measured_file import read_measured
 from experiments.measurement.profile_files import read_heap_profiles
 from experiments.measurement.profile_responses import with_profiles
 from experiments.measurement.value_limits import ValueLimits
-from experiments.studyfile import load_study
-from experiments.studyfile.observables import OUTLINE, OUTLINE_STATIONS
-from experiments.studyfile.study import MeasurementSection
+from experiments.studyfile import load_study, observables, study
 from imaging import save_picture, silhouette
 from imaging.flank.heap_shape import SPACING, STATIONS, profile_heights
 
 SIZE = ValueLimits(grain=1e-4, length=0.14, time=np.inf)
-SETTINGS = MeasurementSection(azimuths=4, pixels=400, outline=True)
-NAMES = [each.name for each in OUTLINE]
+SETTINGS = study.MeasurementSection(azimuths=4, pixels=400, outline=True)
+NAMES = [each.name for each in observables.OUTLINE]
 TARGET = '[target]\nobservable = "outline"\nprofiles = "p.csv"\n'
 Cone = Callable[..., CaseResult]
 
@@ -44,7 +42,7 @@ def test_a_triangle_has_the_heights_of_its_formula() -> None:
     expected[0] = 10.0 - 0.5 * 0.25 * SPACING * root  # the apex stands in the middle of its width
     inside = np.array(STATIONS) + SPACING / 2 < 20.0 / root
     assert profile_heights(x, z)[inside] == pytest.approx(expected[inside], rel=1e-6)
-    assert len(STATIONS) == OUTLINE_STATIONS == len(OUTLINE)
+    assert len(STATIONS) == observables.OUTLINE_STATIONS == len(observables.OUTLINE)
 
 
 def test_the_profile_does_not_depend_on_the_place_and_on_single_grains() -> None:
@@ -63,7 +61,7 @@ def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_pat
     own = np.array([observe(SETTINGS, heap).observables[name] for name in NAMES])
     values, reason = measure(SETTINGS, heap, NAMES)
     assert (reason, values.tolist()) == ("", own.tolist())
-    assert "outline_1" not in observe(MeasurementSection(azimuths=4, pixels=400), heap).observables
+    assert "outline_1" not in observe(study.MeasurementSection(azimuths=4, pixels=400), heap).observables
     spheres = np.column_stack([heap.sphere_centers, heap.sphere_radii])
     np.savetxt(tmp_path / "heap.csv", spheres, delimiter=",", header="x,y,z,radius", comments="")
     drawn = silhouette(heap.sphere_centers, heap.sphere_radii, 0.0)

@@ -13,9 +13,7 @@ from typer.testing import CliRunner
 from doe.discrepancy import Measured
 from experiments.cli import app
 from experiments.io.errors import InputError
-from experiments.measurement.data_notes import SUSPICION
-from experiments.measurement.measured_file import read_measured
-from experiments.measurement.readings import CLOGGED
+from experiments.measurement import data_notes, measured_file, readings
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import NAMES
 from imaging import save_picture
@@ -37,7 +35,7 @@ def read(tmp_path: Path, study: Study) -> Callable[[str], Measured]:
     def read_rows(rows: str, header: str = HEADER) -> Measured:
         path = tmp_path / "measured.csv"
         path.write_text(header + rows, encoding="utf-8")
-        return read_measured(path, study)
+        return measured_file.read_measured(path, study)
 
     return read_rows
 
@@ -72,7 +70,7 @@ def test_rows_become_heaps_in_the_order_of_the_study_with_units_converted(read) 
 
 def test_a_clogged_tube_is_an_outcome(read) -> None:
     data = read(angles("base", 24.0, 26.0) + "base,3,clogged,,,,\n")
-    assert data.reasons["base"] == ("", "", CLOGGED)
+    assert data.reasons["base"] == ("", "", readings.CLOGGED)
     np.testing.assert_array_equal(data.mean("base"), [25.0])
     assert noted(data, "base", "1 of 3 replicates left no heap")
 
@@ -261,7 +259,7 @@ def test_sound_data_are_suspected_no_oftener_than_stated(read) -> None:
         )
         suspected += bool(noted(data, "counts like them") or noted(data, "contradict"))
     # At most 2 x SUSPICION = 2 % of 100; 7 or more then have a probability of 0.4 %.
-    assert 2 * SUSPICION == 0.02
+    assert 2 * data_notes.SUSPICION == 0.02
     assert suspected < 7
 
 
@@ -279,7 +277,7 @@ def test_the_template_is_valid_once_filled_in(
     assert "wide: scene.lifted-cylinder.diameter = 40 mm (held out" in text
     study = load_study("small.toml")
     with pytest.raises(InputError, match="no measured value"):
-        read_measured(path, study)
+        measured_file.read_measured(path, study)
 
     values = dict.fromkeys(NAMES, "0.1") | {"flank_angle": "25", "height": "12", "r50": "15", "r90": "30"}
     values |= {"fill_height": "28", "centre_height": "5", "t55": "0.2"}
@@ -290,7 +288,7 @@ def test_the_template_is_valid_once_filled_in(
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(row | {"value": values[row["observable"]]} for row in rows)
-    data = read_measured(path, study)
+    data = measured_file.read_measured(path, study)
     assert data.conditions == ("base", "fast", "wide")
     assert data.observables == NAMES
     assert {rows.shape for rows in data.values.values()} == {(5, 12)}

@@ -14,9 +14,7 @@ from playwright.sync_api import Browser, BrowserContext, Page
 
 from doe.discrepancy import Settings, Verdict
 from experiments.calibrate import Campaign, calibrate
-from experiments.report import HeapPicture, SolidHeap, render_page
-from experiments.report.discovery import render_discovery
-from experiments.report.kit import html
+from experiments.report import HeapPicture, SolidHeap, discovery, kit, render_page
 from experiments.report.kit.theme import DARK, LIGHT
 from experiments.studyfile import Study, load_study
 
@@ -74,10 +72,10 @@ def files(
     study = study_with(load_study(None, "bench"), selection={"keep": ("E", "F")})
     found: Campaign = calibrate(study, AnalyticHeaps())
     monkeypatch = pytest.MonkeyPatch()
-    monkeypatch.setattr(html, "get_plotlyjs", lambda: plotly)
+    monkeypatch.setattr(kit.html, "get_plotlyjs", lambda: plotly)
     pages = {
         "calibration": render_page(found, study, [picture], {"device": "cpu"}, solid=small_heap()),
-        "search": render_discovery(
+        "search": discovery.render_discovery(
             made_discovery(Verdict.NAMED), whole_study, terms, Settings(), [picture], ["study-with.toml"],
             {"device": "cpu"}, solid=small_heap(),
         ),

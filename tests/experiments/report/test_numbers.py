@@ -4,39 +4,33 @@ import pandas as pd
 import pytest
 from page_reader import Page
 
+from experiments.report.kit import numbers
 from experiments.report.kit.html import flat
 from experiments.report.kit.markdown import markdown_table
-from experiments.report.kit.numbers import (
-    enumeration,
-    equation,
-    fixed,
-    p_value,
-    plain,
-    prose,
-    significant,
-    trimmed,
-)
 from experiments.report.kit.table import Column, make_table
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (fixed(-0.004, 2), "0.00"),
-        (fixed(-1.234, 2), "−1.23"),
-        (fixed(12345.6, 1), "12\u202f345.6"),
-        (fixed(float("nan"), 2), "–"),
-        (significant(0.00123456), "0.001235"),
-        (significant(1.0e-9), "1.000e−09"),
-        (trimmed(0.4600, 4), "0.46"),
-        (trimmed(340.0, 2), "340"),
-        (p_value(3e-6), "< 0.0001"),
-        (p_value(0.05), "0.0500"),
-        (plain({"E": 0.5, "F": None}), "E 0.5, F –"),
-        (plain((True, 3)), "yes, 3"),
-        (prose("from -0.58 to +0.60 deg, p-value, degrees"), "from −0.58 to +0.60°, p-value, degrees"),
-        (enumeration(["B", "E", "F"]), "B, E and F"),
-        (enumeration(["E"]), "E"),
+        (numbers.fixed(-0.004, 2), "0.00"),
+        (numbers.fixed(-1.234, 2), "−1.23"),
+        (numbers.fixed(12345.6, 1), "12\u202f345.6"),
+        (numbers.fixed(float("nan"), 2), "–"),
+        (numbers.significant(0.00123456), "0.001235"),
+        (numbers.significant(1.0e-9), "1.000e−09"),
+        (numbers.trimmed(0.4600, 4), "0.46"),
+        (numbers.trimmed(340.0, 2), "340"),
+        (numbers.p_value(3e-6), "< 0.0001"),
+        (numbers.p_value(0.05), "0.0500"),
+        (numbers.plain({"E": 0.5, "F": None}), "E 0.5, F –"),
+        (numbers.plain((True, 3)), "yes, 3"),
+        (
+            numbers.prose("from -0.58 to +0.60 deg, p-value, degrees"),
+            "from −0.58 to +0.60°, p-value, degrees",
+        ),
+        (numbers.enumeration(["B", "E", "F"]), "B, E and F"),
+        (numbers.enumeration(["E"]), "E"),
         (flat({"a": {"b": 1.5}, "c": [{"d": 2}], "e": {}}), {"a.b": "1.5", "c 1.d": "2", "e": "–"}),
     ],
 )
@@ -45,7 +39,7 @@ def test_numbers_read_as_a_reader_expects(text: object, expected: object) -> Non
 
 
 def test_an_equation_is_typeset_with_signs_and_powers() -> None:
-    text = equation({"intercept": -60.8, "E:F": 121.17, "E^2": -72.09}, digits=4)
+    text = numbers.equation({"intercept": -60.8, "E:F": 121.17, "E^2": -72.09}, digits=4)
     assert (
         Page(f"<p>{text}</p>").text.replace("\xa0", " ").replace("\u2009", " ")
         == "−60.80 + 121.2 E·F − 72.09 E2"

@@ -10,9 +10,7 @@ from analytic_heaps import study_with
 from page_reader import Page
 
 from experiments.calibrate import Campaign, Outcome
-from experiments.report import HeapPicture, render_page
-from experiments.report.campaign_page import study_facts
-from experiments.report.kit import html
+from experiments.report import HeapPicture, campaign_page, kit, render_page
 from experiments.report.kit.numbers import prose
 from experiments.studies.buckwheat import paper
 from experiments.studyfile import Study, load_study
@@ -29,7 +27,7 @@ def test_the_page_is_well_formed_and_its_contents_lead_somewhere(page) -> None:
 def test_the_page_needs_no_network(
     campaign: Campaign, study: Study, plotly: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(html, "get_plotlyjs", lambda: plotly)
+    monkeypatch.setattr(kit.html, "get_plotlyjs", lambda: plotly)
     picture = HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8))
     text = render_page(campaign, study, [picture])
     assert all(link.startswith(("#", "data:")) for link in Page(text).links)
@@ -132,8 +130,8 @@ def test_only_the_papers_study_shows_the_papers_numbers(campaign: Campaign, stud
 
 def test_the_facts_name_the_spheres_of_every_shape(write_study: Callable[..., Path]) -> None:
     one = load_study(write_study())
-    assert study_facts(one)["Grains"] == "30 grains, 1 sphere each"
+    assert campaign_page.study_facts(one)["Grains"] == "30 grains, 1 sphere each"
     (one.file.parent / "two.txt").write_text("0 0 0 1\n1 0 0 1\n", encoding="utf-8")
     shapes = '[grain.shapes.a]\nclump = "two.txt"\n[grain.shapes.b]\nsphere = "2 mm"\nfraction = 0.5\n\n'
     both = load_study(write_study(('sphere = "2 mm"\n', ""), ("[wall]", f"{shapes}[wall]")))
-    assert study_facts(both)["Grains"] == "30 grains, 1 or 2 spheres each"
+    assert campaign_page.study_facts(both)["Grains"] == "30 grains, 1 or 2 spheres each"

@@ -24,9 +24,7 @@ from experiments.cases.workers import own
 from experiments.discover.search import Search
 from experiments.io.errors import InputError
 from experiments.runs import calibration as run
-from experiments.runs.choices import prepare
-from experiments.runs.request import RunRequest
-from experiments.runs.run_folder import BANK, OUTCOMES
+from experiments.runs import choices, request, run_folder
 from experiments.studyfile import Study, load_study
 
 SLOPE = 30.0
@@ -75,7 +73,7 @@ def study(write_study: Callable[..., Path]) -> Study:
 def run_campaign(
     study: Study, folder: Path, resume: bool = False, on_stage: StageHook | None = None
 ) -> Campaign:
-    prepared = prepare(study, RunRequest(out=folder, device="cpu", resume=resume))
+    prepared = choices.prepare(study, request.RunRequest(out=folder, device="cpu", resume=resume))
     return run.run_calibration(prepared, on_stage).campaign
 
 
@@ -164,9 +162,9 @@ def leave_bank(study: Study, folder: Path, table: bool = True) -> None:
     search, names = Search.of(study), tuple(each.name for each in study.measurable)
     points = bank_points(search.space, search.settings)
     outcomes = Outcomes(np.ones((len(points), len(names))), ("",) * len(points))
-    make_bank(search.space, names, points, outcomes, search.fingerprint).save(folder / BANK)
+    make_bank(search.space, names, points, outcomes, search.fingerprint).save(folder / run_folder.BANK)
     if table:
-        OutcomeTable(folder / OUTCOMES).save({"key": (np.ones(1), "")})
+        OutcomeTable(folder / run_folder.OUTCOMES).save({"key": (np.ones(1), "")})
 
 
 def listed(folder: Path) -> dict[str, str]:
@@ -182,16 +180,16 @@ def test_a_bank_goes_when_another_grain_or_test_is_run_and_stays_while_it_serves
     first = load_study(write_study(add=more))
     run_campaign(first, folder)
     leave_bank(first, folder)
-    outcomes = sha256_of(folder / OUTCOMES)
+    outcomes = sha256_of(folder / run_folder.OUTCOMES)
     for same_heaps in (first, load_study(write_study(("n = 5", "n = 6"), add=more))):
         run_campaign(same_heaps, folder, resume=True)
-        assert listed(folder)[BANK] == sha256_of(folder / BANK)
+        assert listed(folder)[run_folder.BANK] == sha256_of(folder / run_folder.BANK)
     wider = load_study(write_study(('diameter = "28 mm"', 'diameter = "29 mm"'), add=more))
     run_campaign(wider, folder, resume=True)
-    assert not (folder / BANK).exists()
-    assert BANK not in listed(folder)
+    assert not (folder / run_folder.BANK).exists()
+    assert run_folder.BANK not in listed(folder)
     # its rows are found by all that determines them, as the stored cases are
-    assert sha256_of(folder / OUTCOMES) == outcomes
+    assert sha256_of(folder / run_folder.OUTCOMES) == outcomes
 
 
 @pytest.mark.usefixtures("_without_report", "engine")
@@ -200,5 +198,5 @@ def test_a_bank_that_a_person_brought_is_left_alone(study: Study, tmp_path: Path
     other = load_study(study.file, study.scale, {"wall": {"poisson_ratio": 0.2}})
     leave_bank(other, tmp_path / "out", table=False)
     run_campaign(study, tmp_path / "out", resume=True)
-    assert (tmp_path / "out" / BANK).is_file()
-    assert BANK not in listed(tmp_path / "out")
+    assert (tmp_path / "out" / run_folder.BANK).is_file()
+    assert run_folder.BANK not in listed(tmp_path / "out")

@@ -10,9 +10,7 @@ from dem_warp.parameters import UNITS as ENGINE_UNITS
 from doe import Sample
 from experiments.io.errors import StudyError
 from experiments.io.units import UNITS, Quantity, dimension_of_unit
-from experiments.studyfile import load_study, study_scales, write_template
-from experiments.studyfile.campaign import Response, Target
-from experiments.studyfile.schema import Dimension
+from experiments.studyfile import campaign, load_study, schema, study_scales, write_template
 
 WriteStudy = Callable[..., Path]
 
@@ -33,9 +31,9 @@ def test_every_unit_survives_a_round_trip() -> None:
     for dimension, units in UNITS.items():
         for unit in units:
             for other in units:
-                there = Dimension(dimension).to_unit(Quantity(1.5, unit), other)
+                there = schema.Dimension(dimension).to_unit(Quantity(1.5, unit), other)
                 # Two roundings each way.
-                back = Dimension(dimension).to_unit(Quantity(there, other), unit)
+                back = schema.Dimension(dimension).to_unit(Quantity(there, other), unit)
                 assert back == pytest.approx(1.5, rel=1e-15)
 
 
@@ -46,8 +44,8 @@ def test_every_unit_of_a_parameter_of_the_engine_can_be_written() -> None:
 def test_the_paper_study_is_the_papers() -> None:
     study = load_study()
     assert {f.name: (f.low, f.high, f.unit) for f in study.factors} == PAPER_FACTORS
-    angle = Response("angle", "angle", "deg", measured=Sample(30.148, 0.518, 5))
-    assert study.target == Target((angle,))
+    angle = campaign.Response("angle", "angle", "deg", measured=Sample(30.148, 0.518, 5))
+    assert study.target == campaign.Target((angle,))
     assert study.companion == "buckwheat"
     case = study.case({}, seed=3)
     assert (case.scene.diameter, case.scene.height, case.scene.lift_speed) == (0.035, 0.110, 0.05)

@@ -4,11 +4,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from dem_warp.laws.capillary import CapillaryBridge
-from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
-from dem_warp.laws.jkr import JKR
-from dem_warp.laws.rate_weakening import RateWeakening
-from dem_warp.laws.wall_adhesion import WallAdhesion
+from dem_warp.laws import capillary, elastic_plastic_rolling, jkr, rate_weakening, wall_adhesion
 from experiments.studyfile import load_study
 
 WriteStudy = Callable[..., Path]
@@ -21,8 +17,8 @@ def test_mechanisms_are_those_of_the_library(write_study: WriteStudy) -> None:
         write_study(add=f'\n{SPRING}between = "grains"\n[mechanism.jkr]\nwork_of_adhesion = 0.1\n')
     )
     assert study.case({}, seed=1).mechanisms == (
-        JKR(work_of_adhesion=0.1),
-        ElasticPlasticRolling(rolling_stiffness=2.25, between="grains"),
+        jkr.JKR(work_of_adhesion=0.1),
+        elastic_plastic_rolling.ElasticPlasticRolling(rolling_stiffness=2.25, between="grains"),
     )
     assert load_study().case({}, seed=1).mechanisms == ()
 
@@ -34,7 +30,9 @@ def test_a_mechanism_can_be_a_factor(write_study: WriteStudy) -> None:
     )
     friction = ("restitution = 0.2", "restitution = 0.2\nstatic_friction = 0.3")
     study = load_study(write_study(varied, friction))
-    assert study.case({"E": 0.5}, seed=1).mechanisms == (ElasticPlasticRolling(rolling_stiffness=0.5),)
+    assert study.case({"E": 0.5}, seed=1).mechanisms == (
+        elastic_plastic_rolling.ElasticPlasticRolling(rolling_stiffness=0.5),
+    )
 
 
 def test_parameters_of_mechanisms_have_units_and_plain_numbers_are_si(write_study: WriteStudy) -> None:
@@ -50,11 +48,11 @@ weakening_speed = "10 cm/s"
 wall_adhesion_energy_density = 50.0
 """
     wall, water, weakening = load_study(write_study(add=bridge)).case({}, seed=1).mechanisms
-    assert wall == WallAdhesion(wall_adhesion_energy_density=50.0)
-    assert water == CapillaryBridge(
+    assert wall == wall_adhesion.WallAdhesion(wall_adhesion_energy_density=50.0)
+    assert water == capillary.CapillaryBridge(
         surface_tension=0.072, bridge_volume=2e-8, contact_angle=math.radians(30.0)
     )
-    assert weakening == RateWeakening(weakening=0.3, weakening_speed=0.1)
+    assert weakening == rate_weakening.RateWeakening(weakening=0.3, weakening_speed=0.1)
 
 
 def test_mechanisms_that_exclude_each_other_may_act_in_different_contacts(write_study: WriteStudy) -> None:

@@ -9,15 +9,7 @@ import pytest
 from analytic_heaps import AnalyticHeaps, study_with
 
 from experiments.calibrate import Campaign, calibrate
-from experiments.evidence.studies.buckwheat.records import paper_record
-from experiments.evidence.studies.buckwheat.records.paper_page import (
-    PAGE,
-    RUNS,
-    Record,
-    record_page,
-    scale_cost,
-    write_record,
-)
+from experiments.evidence.studies.buckwheat.records import paper_page, paper_record
 from experiments.evidence.studies.buckwheat.replay.replay import Replay
 from experiments.evidence.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
 from experiments.evidence.studies.buckwheat.replay.runs import planned_cases
@@ -54,17 +46,17 @@ def campaign(study: Study) -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def committed() -> Record:
+def committed() -> paper_page.Record:
     """Return the record in the tree."""
-    return Record.read(paper_record.FOLDER)
+    return paper_page.Record.read(paper_record.FOLDER)
 
 
-def test_the_committed_page_follows_from_the_committed_angles(committed: Record) -> None:
-    page = (paper_record.FOLDER / PAGE).read_text(encoding="utf-8")
-    assert page == record_page(committed)
+def test_the_committed_page_follows_from_the_committed_angles(committed: paper_page.Record) -> None:
+    page = (paper_record.FOLDER / paper_page.PAGE).read_text(encoding="utf-8")
+    assert page == paper_page.record_page(committed)
 
 
-def test_the_committed_card_is_that_of_the_committed_campaign(committed: Record) -> None:
+def test_the_committed_card_is_that_of_the_committed_campaign(committed: paper_page.Record) -> None:
     card = tomllib.loads((paper_record.FOLDER / CARD).read_text(encoding="utf-8"))
     campaign = committed.campaign
     assert campaign is not None
@@ -79,7 +71,7 @@ def test_the_committed_card_is_that_of_the_committed_campaign(committed: Record)
 
 
 def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaign) -> None:
-    page = write_record(
+    page = paper_page.write_record(
         tmp_path, cases(1.5), {"device": "CPU", "wall_times": WALL_TIMES}, campaign
     ).read_text("utf-8")
     replay = Replay(cases(1.5))
@@ -99,29 +91,29 @@ def test_a_record_includes_a_card_scales_notes_and_side_studies(
 ) -> None:
     bench, record = tmp_path / "bench", tmp_path / "record"
     for folder, shift in ((tmp_path / "paper", 0.0), (bench, -4.0)):
-        write_record(folder / "record", cases(shift), {"commit": None}, campaign)
+        paper_page.write_record(folder / "record", cases(shift), {"commit": None}, campaign)
     write_material_card(campaign, study, tmp_path / "paper")
     record.mkdir()
     (record / "notes.md").write_text("What we make of it.", encoding="utf-8")
     (record / "side_studies.md").write_text("## Another clump", encoding="utf-8")
     paper_record.main(tmp_path / "paper", [f"bench={bench}"], "abc123", record)
-    page = (record / PAGE).read_text(encoding="utf-8")
+    page = (record / paper_page.PAGE).read_text(encoding="utf-8")
     assert "What we make of it." in page
     assert f"]({CARD})" in page
     clumps = [Path(read_card(folder / CARD)["grain"]["clump"]) for folder in (tmp_path / "paper", record)]
     assert clumps[1].read_bytes() == clumps[0].read_bytes()
     assert "- commit: abc123" in page
-    cost = scale_cost(Replay(cases(-4.0)), Replay(cases()))
+    cost = paper_page.scale_cost(Replay(cases(-4.0)), Replay(cases()))
     # The same noise in both: the difference is the shift.
     assert cost.bias.value == pytest.approx(-4.0)
     assert numbers_of(page, "What a smaller scale costs")[0][4] == "−4.00"
     assert "## Another clump" in page
     paper_record.main(None, None, None, record)
-    assert (record / PAGE).read_text(encoding="utf-8") == page
+    assert (record / paper_page.PAGE).read_text(encoding="utf-8") == page
 
 
 def test_a_folder_without_the_papers_runs_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f"{RUNS}: no such file"):
+    with pytest.raises(InputError, match=f"{paper_page.RUNS}: no such file"):
         paper_record.gather_scale("bench", tmp_path, tmp_path / "record")
 
 
@@ -130,7 +122,7 @@ def test_a_record_of_few_angles_says_what_can_be_said() -> None:
     some.loc[some["stage"] != "climb", "angle"] = np.nan
     some.loc[:5, "angle"] = 20.0  # three screening runs
     assert set(replay_tables(Replay(some))) == {"agreement", "runs"}
-    page = record_page(Record(Replay(some), {}))
+    page = paper_page.record_page(paper_page.Record(Replay(some), {}))
     assert [row[:2] for row in numbers_of(page, "Agreement")][:2] == [
         ["Table 3, Plackett-Burman screening", "3"],
         ["Table 5, steepest climb", "6"],

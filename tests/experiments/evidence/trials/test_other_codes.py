@@ -19,17 +19,11 @@ from experiments.cases import OwnWorkers
 from experiments.cases.engines.program import AnswerError
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.evidence.trials.generate_trials import STUDY
+from experiments.evidence.trials.other_codes import dump_reading
 from experiments.evidence.trials.other_codes.code_effects import DECLARED, OUTSIDE
 from experiments.evidence.trials.other_codes.code_process import engine_for
 from experiments.evidence.trials.other_codes.code_simulator import OtherCodeSimulator
 from experiments.evidence.trials.other_codes.code_surfaces import Bench
-from experiments.evidence.trials.other_codes.dump_reading import (
-    Frame,
-    Grasp,
-    filmed_observables,
-    read_balance,
-    read_film,
-)
 from experiments.evidence.trials.other_codes.generate_other import PLAN, in_turn, plan_for
 from experiments.evidence.trials.other_codes.liggghts_trials import energy_density, liggghts_files, wetting
 from experiments.evidence.trials.other_codes.making import MADE
@@ -93,7 +87,7 @@ def test_a_grain_is_found_by_its_spheres() -> None:
     rng = np.random.default_rng(1)
     places, sizes = rng.uniform(-0.01, 0.01, (7, 3)), rng.uniform(0.9, 1.1, 7)
     velocity = np.array([0.1, -0.2, 0.3])
-    frame = Grasp(SHAPE).frame(5, rows_of(places, sizes, 2, velocity))
+    frame = dump_reading.Grasp(SHAPE).frame(5, rows_of(places, sizes, 2, velocity))
     # nine digits of metres in, double precision through
     assert frame.positions == pytest.approx(places, abs=1e-12)
     assert frame.sizes == pytest.approx(sizes, rel=1e-12)
@@ -105,28 +99,28 @@ def test_spheres_that_are_no_grain_are_refused() -> None:
     rows = rows_of(np.zeros((1, 3)), np.ones(1), 2, np.zeros(3))
     rows[0, 2] += 1e-4
     with pytest.raises(AnswerError, match="not where its shape has them"):
-        Grasp(SHAPE).frame(0, rows)
+        dump_reading.Grasp(SHAPE).frame(0, rows)
     with pytest.raises(AnswerError, match="every grain must have 3 spheres"):
-        Grasp(SHAPE).frame(0, rows[:2])
+        dump_reading.Grasp(SHAPE).frame(0, rows[:2])
 
 
 def test_a_film_that_breaks_off_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "film.dump"
     with pytest.raises(AnswerError, match=r"wrote no film\.dump"):
-        list(read_film(path, SHAPE))
+        list(dump_reading.read_film(path, SHAPE))
     head = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n3\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
     row = " ".join(["0.0"] * 9)
     path.write_text(head.format(4) + f"ITEM: ATOMS id mol x y z vx vy vz radius\n{row}\n{row}\n")
     with pytest.raises(AnswerError, match="step 4 must have 3 rows, got 2"):
-        list(read_film(path, SHAPE))
+        list(dump_reading.read_film(path, SHAPE))
     (tmp_path / "balance.txt").write_text("# step force\n# second\n100 -0.5\n150 -0.25\n")
-    assert read_balance(tmp_path / "balance.txt") == {100: -0.5, 150: -0.25}
+    assert dump_reading.read_balance(tmp_path / "balance.txt") == {100: -0.5, 150: -0.25}
 
 
 FALL_STEPS, LOOK = 4000, 50
 
 
-def _film(case: Case, places: np.ndarray) -> Iterator[Frame]:
+def _film(case: Case, places: np.ndarray) -> Iterator[dump_reading.Frame]:
     """Film of a bed that shrinks to a tenth of its height at one rate, and then lies still."""
     still = round((case.scene.lift_time + case.scene.rest_time + 0.1) / case.time_step)
     for step in range(0, FALL_STEPS + still, LOOK):
@@ -137,7 +131,9 @@ def _film(case: Case, places: np.ndarray) -> Iterator[Frame]:
         numbers, sizes = np.arange(1, len(places) + 1), np.ones(len(places))
         spheres = now[:, None] + SHAPE.centers[None]
         radii = np.broadcast_to(SHAPE.radii[None, :, None], (len(places), SHAPE.sphere_count, 1))
-        yield Frame(step, numbers, now, velocity, sizes, np.concatenate([spheres, radii], axis=2))
+        yield dump_reading.Frame(
+            step, numbers, now, velocity, sizes, np.concatenate([spheres, radii], axis=2)
+        )
 
 
 def test_times_and_drag_of_a_drawn_film_are_those_it_was_drawn_with() -> None:
@@ -149,7 +145,7 @@ def test_times_and_drag_of_a_drawn_film_are_those_it_was_drawn_with() -> None:
     # a quarter of the weight hangs on the tube in every step
     frames = list(_film(case, places))
     forces = {frame.step: -0.25 * mass * G for frame in frames[1:]}
-    seen, last, failure = filmed_observables(case, iter(frames), forces)
+    seen, last, failure = dump_reading.filmed_observables(case, iter(frames), forces)
     assert failure == ""
     assert seen["wall_drag"] == pytest.approx(0.25, rel=1e-6)
     reach = case.grains.grain_reach

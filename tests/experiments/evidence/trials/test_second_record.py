@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from doe.discrepancy import Settings, Verdict
+from experiments.evidence.trials import truth
 from experiments.evidence.trials.declaration import Declaration
 from experiments.evidence.trials.findings import EVERYTHING, Finding, findings_table, write_findings
 from experiments.evidence.trials.other_codes.generate_other import app, write_reality
@@ -16,25 +17,16 @@ from experiments.evidence.trials.run_trials import open_jobs
 from experiments.evidence.trials.trial_heaps import unpack_heaps
 from experiments.evidence.trials.trials_folder import HEAPS, LABELS, REALITY, Folder
 from experiments.evidence.trials.trials_page import read_record, write_trials_page
-from experiments.evidence.trials.truth import (
-    Kind,
-    Label,
-    Sealed,
-    read_labels,
-    read_sealed,
-    write_labels,
-    write_sealed,
-)
 from experiments.evidence.trials.truths import Declared, Plan
 from experiments.io.errors import InputError
 
 ANALYSED, MEASURED, UNTOUCHED = "alone-001", "alone-002", "alone-003"
 
 
-def label_of(trial: str, *names: str) -> Label:
-    kind = Kind.SINGLE if names else Kind.NULL
+def label_of(trial: str, *names: str) -> truth.Label:
+    kind = truth.Kind.SINGLE if names else truth.Kind.NULL
     sizes = tuple((name, 3.5) for name in names)
-    return Label(trial, kind, (0.5, 0.5, 0.3), sizes, (2.0,) * len(names), 7, f"salt of {trial}")
+    return truth.Label(trial, kind, (0.5, 0.5, 0.3), sizes, (2.0,) * len(names), 7, f"salt of {trial}")
 
 
 @pytest.fixture
@@ -44,8 +36,10 @@ def folder(tmp_path: Path) -> Folder:
     labels = [label_of(ANALYSED, "plate_tilt"), label_of(MEASURED), label_of(UNTOUCHED)]
     library = (Declared("plate_tilt", 0.0, 6.0, detectable=1.75),)
     Declaration("A study", "bench", "2026-11-23", Plan(), Settings(), library, ()).write(folder.declared)
-    write_sealed(folder.sealed, [Sealed(label.trial, "alone", (), label.hash) for label in labels])
-    write_labels(folder.hidden_labels, labels)
+    truth.write_sealed(
+        folder.sealed, [truth.Sealed(label.trial, "alone", (), label.hash) for label in labels]
+    )
+    truth.write_labels(folder.hidden_labels, labels)
     write_reality(folder.record / REALITY, "liggghts")
     (folder.record / "runs.csv").write_text(
         "what,machine,warp,date,cases,seconds\nheaps,a core,Warp 1,2026-11-23,80,9.5\n"
@@ -61,7 +55,7 @@ def folder(tmp_path: Path) -> Folder:
 def test_only_what_has_been_analysed_is_revealed(folder: Folder, tmp_path: Path) -> None:
     record = tmp_path / "record"
     gather(folder, record)
-    assert [label.trial for label in read_labels(record / LABELS)] == [ANALYSED]
+    assert [label.trial for label in truth.read_labels(record / LABELS)] == [ANALYSED]
     for path in record.iterdir():
         assert all(f"salt of {trial}".encode() not in path.read_bytes() for trial in (MEASURED, UNTOUCHED))
     page = write_trials_page(record).read_text(encoding="utf-8")
@@ -80,7 +74,7 @@ def test_only_what_has_been_analysed_is_revealed(folder: Folder, tmp_path: Path)
 
 
 def test_a_label_that_is_not_there_reveals_nothing(folder: Folder, tmp_path: Path) -> None:
-    write_labels(folder.hidden_labels, [label_of(MEASURED), label_of(UNTOUCHED)])
+    truth.write_labels(folder.hidden_labels, [label_of(MEASURED), label_of(UNTOUCHED)])
     with pytest.raises(InputError, match="the sealed trial has no label"):
         gather(folder, tmp_path / "record")
     assert not (tmp_path / "record").exists()
@@ -99,7 +93,9 @@ def test_a_record_can_be_gone_on_from_elsewhere(folder: Folder, tmp_path: Path) 
     assert not elsewhere.hidden.exists()
     for trial in (ANALYSED, MEASURED):
         assert elsewhere.measured(trial).read_bytes() == folder.measured(trial).read_bytes()
-    there = [trial for trial in read_sealed(elsewhere.sealed) if elsewhere.measured(trial.trial).exists()]
+    there = [
+        trial for trial in truth.read_sealed(elsewhere.sealed) if elsewhere.measured(trial.trial).exists()
+    ]
     assert list(open_jobs(elsewhere, there, [EVERYTHING])) == [f"{MEASURED}.{EVERYTHING}"]
     # never over trials that are there, and no heaps without their labels
     assert CliRunner().invoke(app, words).exit_code == 2

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from doe.discrepancy import Verdict
-from experiments.evidence.trials import trials_page
+from experiments.evidence.trials import score, trials_page
 from experiments.evidence.trials.findings import (
     EVERYTHING,
     Finding,
@@ -16,18 +16,6 @@ from experiments.evidence.trials.findings import (
     write_findings,
 )
 from experiments.evidence.trials.record_trials import gather
-from experiments.evidence.trials.score import (
-    Share,
-    aims,
-    by_mechanism,
-    confusion,
-    covered,
-    foreign_aims,
-    power_curve,
-    removed,
-    scored,
-    unknown_area,
-)
 from experiments.evidence.trials.trials_folder import Folder
 from experiments.evidence.trials.trials_page import write_trials_page
 from experiments.evidence.trials.truth import Kind, Label, Sealed, write_sealed
@@ -64,15 +52,15 @@ def test_a_verdict_is_judged_by_what_it_names(
     label: Label, verdict: Verdict, named: str, judgement: str
 ) -> None:
     table = findings_table([Finding("t", EVERYTHING, str(verdict), named)])
-    [row] = scored(table, {"t": label}, [Sealed("t", "alone", (), "")]).to_dict("records")
+    [row] = score.scored(table, {"t": label}, [Sealed("t", "alone", (), "")]).to_dict("records")
     assert [name for name in ("right", "tied", "wrong") if row[name]] == ([judgement] if judgement else [])
 
 
 def test_shares_have_the_intervals_of_clopper_and_pearson() -> None:
     # 0 of n: 1 - (0.05 / 2)^(1/n).
-    assert Share(0, 42).interval == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 42)))
-    assert Share(42, 42).interval == pytest.approx((0.025 ** (1 / 42), 1.0))
-    assert str(Share(0, 0)) == "no trials"
+    assert score.Share(0, 42).interval == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 42)))
+    assert score.Share(42, 42).interval == pytest.approx((0.025 ** (1 / 42), 1.0))
+    assert str(score.Share(0, 0)) == "no trials"
 
 
 def ideal_trials() -> tuple[pd.DataFrame, dict[str, Label]]:
@@ -101,14 +89,14 @@ def ideal(trial: str, label: Label) -> Finding:
 
 def test_an_analysis_that_is_right_passes_every_aim() -> None:
     findings, labels = ideal_trials()
-    table = scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
-    found = aims(table, unresolvable=["twist"])
+    table = score.scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
+    found = score.aims(table, unresolvable=["twist"])
     assert [aim.question for aim in found if aim.passed is not True] == []
-    assert all(aim.passed for aim in foreign_aims(table))
-    assert removed(table) == pytest.approx(0.9)
-    assert covered(table).mean() == pytest.approx(1.0 - 2 / 15)
-    assert confusion(table).to_numpy().sum() == len(labels)
-    curve = power_curve(table)
+    assert all(aim.passed for aim in score.foreign_aims(table))
+    assert score.removed(table) == pytest.approx(0.9)
+    assert score.covered(table).mean() == pytest.approx(1.0 - 2 / 15)
+    assert score.confusion(table).to_numpy().sum() == len(labels)
+    curve = score.power_curve(table)
     assert curve["trials"].sum() == 120
     assert (curve["right"] == 1.0).all()
 
@@ -137,13 +125,13 @@ def test_an_analysis_that_is_wrong_fails_the_aims_that_it_misses(
         named=findings["named"].mask(hit, named),
         alarm=findings["alarm"] | hit,
     )
-    table = scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
-    assert {aim.question for aim in aims(table, ["twist"]) if aim.passed is False} == failed
+    table = score.scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
+    assert {aim.question for aim in score.aims(table, ["twist"]) if aim.passed is False} == failed
     # the aims of a second reality have no share of pairs named, and none of names that may not be
     shared = failed - {"two mechanisms: both named", "names that were declared not resolvable"}
     wrong = {"any trial: a wrong name"} if verdict == "named" else set()
     worded = {q.replace("two mechanisms: no wrong name", "two mechanisms: a wrong name") for q in shared}
-    missed = {aim.question for aim in foreign_aims(table) if aim.passed is False}
+    missed = {aim.question for aim in score.foreign_aims(table) if aim.passed is False}
     assert missed == worded | wrong
 
 
@@ -160,20 +148,20 @@ def test_a_strong_trial_ends_in_one_way() -> None:
         changed = findings.assign(
             verdict=findings["verdict"].mask(one, verdict), named=findings["named"].mask(one, named)
         )
-        ends = by_mechanism(scored(changed, labels, [])).drop(columns="trials")
+        ends = score.by_mechanism(score.scored(changed, labels, [])).drop(columns="trials")
         assert (ends.sum(axis=1) == 15).all()
         assert ends.loc["a", column] == 1
 
 
 def test_unknown_has_the_area_of_its_misfits() -> None:
     findings, labels = ideal_trials()
-    assert unknown_area(scored(findings, labels, [])) == ""  # as older records, without a score
+    assert score.unknown_area(score.scored(findings, labels, [])) == ""  # as older records, without a score
     kinds = findings["trial"].map({trial: label.kind for trial, label in labels.items()})
     changed = findings.assign(misfit=kinds.map({Kind.OUTSIDE: 3.0, Kind.SINGLE: 1.0, Kind.PAIR: 2.0}))
-    assert unknown_area(scored(changed, labels, [])).startswith("1.000")
+    assert score.unknown_area(score.scored(changed, labels, [])).startswith("1.000")
     # half of what the library lacks raised no alarm: it is behind all the others
     changed.loc[kinds == Kind.OUTSIDE, "misfit"] = [3.0, float("nan")] * 30
-    assert unknown_area(scored(changed, labels, [])).startswith("0.500")
+    assert score.unknown_area(score.scored(changed, labels, [])).startswith("0.500")
 
 
 def test_findings_without_a_misfit_are_read_as_older_ones(tmp_path: Path) -> None:

@@ -12,15 +12,7 @@ import typer
 from dem_warp.clumps import ClumpShape
 from dem_warp.laws.micro_slip import MicroSlip
 from experiments.evidence.verification import __main__ as verification
-from experiments.evidence.verification.check import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    order_row,
-    relative_row,
-)
+from experiments.evidence.verification import check
 from experiments.evidence.verification.problems import chung_ooi
 from experiments.evidence.verification.problems.contact_ode import solve_impact
 from experiments.evidence.verification.problems.deme_contacts import deme_contacts
@@ -136,24 +128,24 @@ def test_the_base_law_is_one_of_the_laws_of_one_spring():
 
 
 def test_a_row_shows_the_worst_value_and_one_that_is_not_a_number_fails():
-    row = relative_row(LABELS, [1.0, 2.0], [1.01, 2.5], 0.1)
+    row = check.relative_row(LABELS, [1.0, 2.0], [1.01, 2.5], 0.1)
     assert (row.expected, row.simulated, row.error, row.passed) == (2.0, 2.5, 0.25, False)
-    assert absolute_row(LABELS, 0.0, [0.1, math.nan], 1.0).passed is False
-    assert absolute_row(LABELS, 0.0, 0.1, None).passed is None
+    assert check.absolute_row(LABELS, 0.0, [0.1, math.nan], 1.0).passed is False
+    assert check.absolute_row(LABELS, 0.0, 0.1, None).passed is None
 
 
 def test_an_order_is_the_slope_of_the_errors():
     steps = np.array([10, 20, 40])
-    row = order_row("problem", "case", "order", steps, 3.0 / steps**2, 2.0, 1.9)
+    row = check.order_row("problem", "case", "order", steps, 3.0 / steps**2, 2.0, 1.9)
     assert row.simulated == pytest.approx(2.0)
     assert row.passed
-    assert not order_row("problem", "case", "order", steps, 3.0 / steps, 2.0, 1.9).passed
+    assert not check.order_row("problem", "case", "order", steps, 3.0 / steps, 2.0, 1.9).passed
 
 
-def _result(error: float) -> Result:
-    plot = Plot("curve", "A curve", "x", "y", (Curve("line", np.arange(3.0), np.arange(3.0)),))
-    row = Row("A problem", "a case", "speed [m/s]", "a closed form", 1.0, 1.0 + error, error, 0.1)
-    return Result("A chapter", "Words.", (row,), (plot,))
+def _result(error: float) -> check.Result:
+    plot = check.Plot("curve", "A curve", "x", "y", (check.Curve("line", np.arange(3.0), np.arange(3.0)),))
+    row = check.Row("A problem", "a case", "speed [m/s]", "a closed form", 1.0, 1.0 + error, error, 0.1)
+    return check.Result("A chapter", "Words.", (row,), (plot,))
 
 
 def test_the_page_holds_rows_plots_and_their_data(tmp_path: Path, monkeypatch):
@@ -171,7 +163,7 @@ def test_the_page_holds_rows_plots_and_their_data(tmp_path: Path, monkeypatch):
 
 
 def test_a_page_keeps_the_chapters_that_ran_elsewhere(tmp_path: Path, monkeypatch):
-    def second(device: str) -> Result:
+    def second(device: str) -> check.Result:
         return replace(_result(0.02), title="A heavy chapter", plots=())
 
     problems = {"one": lambda device: _result(0.01), "stability": second}

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from experiments.evidence.trials.baselines import benchmark_files, record_methods, run_methods
+from experiments.evidence.trials.baselines import benchmark_files, method_tables, record_methods, run_methods
 from experiments.evidence.trials.baselines.answers_table import add_answer, file_of, read_answers
 from experiments.evidence.trials.baselines.benchmark_files import (
     Benchmark,
@@ -18,16 +18,6 @@ from experiments.evidence.trials.baselines.benchmark_files import (
 )
 from experiments.evidence.trials.baselines.draw import round_of
 from experiments.evidence.trials.baselines.method_list import ALONE
-from experiments.evidence.trials.baselines.method_tables import (
-    Paired,
-    comparisons,
-    due,
-    held,
-    judged,
-    paired,
-    power,
-    summary,
-)
 from experiments.evidence.trials.baselines.protocol import Answer
 from experiments.evidence.trials.score import auroc
 from experiments.evidence.trials.truth import Kind, Label, write_labels
@@ -163,7 +153,7 @@ def test_answers_are_judged_by_what_is_hidden(tmp_path: Path) -> None:
     assert list(poor.index[poor["right"]]) == []
     assert list(poor.index[poor["wrong"]]) == ["n", "o"]
     assert list(poor.index[poor["tied_right"]]) == ["s"]
-    first, second = summary(table).to_dict("records")
+    first, second = method_tables.summary(table).to_dict("records")
     assert (first["false alarms"], first["named"], first["not in the library: unknown"]) == (
         "0 of 1", "1 of 1", "1 of 1"
     )  # fmt: skip
@@ -172,8 +162,8 @@ def test_answers_are_judged_by_what_is_hidden(tmp_path: Path) -> None:
         "1 of 1",
         "1 of 1",
     )
-    assert power(table, "alarm").loc[0.5, "trials"] == 1
-    [row] = comparisons(table, ALONE).to_dict("records")
+    assert method_tables.power(table, "alarm").loc[0.5, "trials"] == 1
+    [row] = method_tables.comparisons(table, ALONE).to_dict("records")
     assert row["no false alarm"].startswith("1 : 0 of 1")
     assert row["right answer"].startswith("4 : 0 of 4")
 
@@ -185,10 +175,10 @@ def test_what_was_declared_not_resolvable_may_be_named_where_it_is_hidden_and_no
         {"trial": "wrong", "alarm": True, "named": "b", "tied": False, "unknown": False},
     ]
     answers = pd.DataFrame(rows).assign(method="m")
-    table = judged(answers, labels)
+    table = method_tables.judged(answers, labels)
     assert list(table["wrong"]) == [False, True]
-    assert not due(table).any()
-    bound = held(answers, ["b"])
+    assert not method_tables.due(table).any()
+    bound = method_tables.held(answers, ["b"])
     assert list(bound["named"]) == ["", "b"]
     assert list(bound["unknown"]) == [True, False]
 
@@ -198,7 +188,7 @@ def test_areas_and_paired_tests_are_those_of_the_textbook() -> None:
     assert auroc(np.array([1.0]), np.array([1.0])) == 0.5
     assert auroc(np.array([1.0, 4.0]), np.array([2.0, 3.0])) == 0.5
     # Ten trials that differ, one of them for the first: 2 (1 + 10) / 2^10.
-    assert Paired(1, 9, 50).p == pytest.approx(22.0 / 1024.0)
-    assert Paired(0, 0, 5).p == 1.0
+    assert method_tables.Paired(1, 9, 50).p == pytest.approx(22.0 / 1024.0)
+    assert method_tables.Paired(0, 0, 5).p == 1.0
     one, other = pd.Series({"a": True, "b": True, "c": False}), pd.Series({"b": False, "c": True, "d": True})
-    assert paired(one, other) == Paired(1, 1, 2)
+    assert method_tables.paired(one, other) == method_tables.Paired(1, 1, 2)
