@@ -9,15 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from doe.arguments import (
-    checked_flag,
-    checked_kind,
-    checked_list,
-    checked_map,
-    checked_number,
-    checked_seed,
-    real_array,
-)
+from doe import arguments
 from doe.design.factors import Category, Factor, checked_factors
 from doe.design.labels import aligned
 from doe.errors import DesignError
@@ -51,9 +43,10 @@ class Design:
 
     def __post_init__(self) -> None:
         factors = checked_factors(self.factors)
-        checked_seed(self.seed)
-        checked_kind("coded, the table of a design,", self.coded, pd.DataFrame)
-        names, dummies = [factor.name for factor in factors], tuple(checked_list("dummies", self.dummies))
+        arguments.checked_seed(self.seed)
+        arguments.checked_kind("coded, the table of a design,", self.coded, pd.DataFrame)
+        names = [factor.name for factor in factors]
+        dummies = tuple(arguments.checked_list("dummies", self.dummies))
         coded = _checked_table(self.coded, names, dummies)
         for name in dummies:
             center = (coded[names] == 0.0).all(axis=1) & (coded[name] == 0.0)
@@ -110,9 +103,9 @@ class Design:
             A factor without column, an unknown column, a value that is not finite, a repeated run label, a
             dummy with other values than -1 and +1, or a table that may be coded or natural.
         """
-        factors, dummies = checked_factors(factors), tuple(checked_list("dummies", dummies))
+        factors, dummies = checked_factors(factors), tuple(arguments.checked_list("dummies", dummies))
         if coded is not None:
-            checked_flag("coded, unless it is None,", coded)
+            arguments.checked_flag("coded, unless it is None,", coded)
         if not isinstance(table, pd.DataFrame):
             raise DesignError(f"table must be a DataFrame, got {type(table).__name__}")
         blocks = None
@@ -165,7 +158,7 @@ class Design:
         It makes a design of a table of finished cases, some replicated, some missing:
         ``design.select(table["run"])``.
         """
-        runs = checked_list("runs", runs)
+        runs = arguments.checked_list("runs", runs)
         unknown = [run for run in runs if not isinstance(run, Hashable) or run not in self.coded.index]
         if unknown:
             raise DesignError(f"the design has no run {unknown[0]!r}; its runs are {list(self.coded.index)}")
@@ -175,7 +168,7 @@ class Design:
 
     def with_blocks(self, labels: Sequence) -> "Design":
         """Return the design with these blocks: a label for each run, in the order of the runs."""
-        labels = checked_list("blocks", labels)
+        labels = arguments.checked_list("blocks", labels)
         if len(labels) != len(self.coded):
             raise DesignError(
                 f"blocks must be one label for each of {len(self.coded)} runs, got {len(labels)}"
@@ -206,7 +199,7 @@ def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.
     position, in the design's row order. Columns of a DataFrame are replicates and are numbered. Raises
     DesignError: other labels, another shape, or a value that is not finite (with its run and replicate).
     """
-    checked_kind("design", design, Design)
+    arguments.checked_kind("design", design, Design)
     values = aligned("a response", response, design.coded.index)
     runs = len(design.coded)
     if values.ndim not in (1, 2) or values.shape[0] != runs or values.size == 0:
@@ -226,7 +219,7 @@ def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.
 
 def checked_setting(name: str, point: Any, factors: Iterable[Factor]) -> dict[str, Any]:
     """Return the natural settings of factors; raise DesignError when one is missing or wrong."""
-    given = checked_map(name, point)
+    given = arguments.checked_map(name, point)
     missing = [factor.name for factor in factors if factor.name not in given]
     if missing:
         raise DesignError(f"no value for factor {missing[0]!r} in {name}: {given}")
@@ -234,7 +227,7 @@ def checked_setting(name: str, point: Any, factors: Iterable[Factor]) -> dict[st
         if isinstance(factor, Category):
             factor.to_coded(given[factor.name])
         else:
-            checked_number(f"the value of {factor.name!r} in {name}", given[factor.name])
+            arguments.checked_number(f"the value of {factor.name!r} in {name}", given[factor.name])
     return {factor.name: given[factor.name] for factor in factors}
 
 
@@ -289,7 +282,7 @@ def _checked_natural(table: pd.DataFrame, factors: tuple[Factor, ...]) -> pd.Dat
             raise DesignError(f"no column for factor {factor.name!r}; the table has {list(table.columns)}")
         column = table[factor.name]
         if not isinstance(factor, Category):
-            column = real_array(f"every column of a design holds numbers: {factor.name!r}", column)
+            column = arguments.real_array(f"every column of a design holds numbers: {factor.name!r}", column)
         columns[factor.name] = column
     return pd.DataFrame(columns, index=table.index)
 
@@ -316,7 +309,7 @@ def _checked_table(table: pd.DataFrame, names: list[str], dummies: tuple[str, ..
             f"a column is a factor or a dummy: {min(set(names) & set(dummies))!r} is named as both"
         )
     columns = {
-        name: real_array(f"every column of a design holds numbers: {name!r}", table[name])
+        name: arguments.real_array(f"every column of a design holds numbers: {name!r}", table[name])
         for name in (*names, *dummies)
     }
     table = pd.DataFrame(columns, index=table.index)

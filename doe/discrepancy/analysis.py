@@ -28,6 +28,7 @@ from doe.discrepancy.fitting.model_fit import Fitted, fit, weigh
 from doe.discrepancy.problem.outcomes import Outcomes, Point
 from doe.discrepancy.problem.replicates import Measured
 from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict import records
 from doe.discrepancy.verdict.before_after import BeforeAfter, compare
 from doe.discrepancy.verdict.conclusion import (
     Assessment,
@@ -46,13 +47,6 @@ from doe.discrepancy.verdict.discovery import (
     Verdict,
 )
 from doe.discrepancy.verdict.next_experiment import NextExperiment, propose
-from doe.discrepancy.verdict.records import (
-    candidate_record,
-    data_record,
-    drift_records,
-    fit_record,
-    scatter_notes,
-)
 from doe.numerics.one_thread import in_one_thread, steps_in_one_thread
 
 Analysis = Generator[list[Point], Outcomes, Discovery]
@@ -307,7 +301,7 @@ class _Parts:
         closest = assessments[0] if assessments else None
         chosen = None if conclusion.chosen is None else assessments[conclusion.chosen]
         shown = closest if chosen is None else chosen
-        fit = None if shown is None else fit_record(shown.fitted, shown.gap, self.evidence)
+        fit = None if shown is None else records.fit_record(shown.fitted, shown.gap, self.evidence)
         failures = self.fresh.failures
         notes = [f"{failures} of {self.fresh.cases} fresh runs failed"] if failures else []
         drop = base.gap
@@ -316,20 +310,21 @@ class _Parts:
             reason=conclusion.reason,
             named=conclusion.named,
             factors=self.emulator.space.factors,
-            data=data_record(self.emulator, self.evidence, base.fitted),
-            base=fit_record(base.fitted, base.gap, self.evidence),
+            data=records.data_record(self.emulator, self.evidence, base.fitted),
+            base=records.fit_record(base.fitted, base.gap, self.evidence),
             chosen=None if chosen is None else fit,
             closest=fit if chosen is None else None,
             gap=Gap(drop.found, drop.drop, drop.drop_limit, drop.mechanism),
-            drifts=drift_records(base.fitted),
+            drifts=records.drift_records(base.fitted),
             candidates=tuple(
-                candidate_record(one, base.seen, base.gap.scores, self.settings) for one in assessments
+                records.candidate_record(one, base.seen, base.gap.scores, self.settings)
+                for one in assessments
             ),
             power=base.power,
             confounding=Confounding(base.seen.names, base.seen.correlations),
             before_after=tuple(before_after),
             next_experiment=self._next(base, conclusion, assessments),
-            notes=(*self.evidence.notes, *scatter_notes(base.fitted), *self.emulator.notes, *notes),
+            notes=(*self.evidence.notes, *records.scatter_notes(base.fitted), *self.emulator.notes, *notes),
             effort=Effort(self.seed, self.settings.sha256, self.emulator.cases, self.fresh.cases),
         )
 
@@ -365,7 +360,7 @@ def _empty(
         reason=conclusion.reason,
         named=(),
         factors=emulator.space.factors,
-        data=data_record(emulator, evidence),
+        data=records.data_record(emulator, evidence),
         notes=(*evidence.notes, *emulator.notes),
         effort=Effort(seed, settings.sha256, emulator.cases, 0),
     )

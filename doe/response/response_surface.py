@@ -10,15 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
-from doe.arguments import (
-    checked_choice,
-    checked_flag,
-    checked_kind,
-    checked_level,
-    checked_map,
-    checked_points,
-    real_array,
-)
+from doe import arguments
 from doe.design.anova import ErrorTerm, anova_table, block_columns, block_sum, least_squares, pure_error
 from doe.design.coefficients import anova_by_order, coefficient_table, significant_words, summary_text
 from doe.design.design import Design, coded_points, observations
@@ -142,7 +134,7 @@ class Surface:
 
     def equation(self, units: str = "natural", digits: int = 6) -> str:
         """Return the fitted polynomial as text, in natural or coded units."""
-        checked_choice("units", units, ("natural", "coded"))
+        arguments.checked_choice("units", units, ("natural", "coded"))
         coefficients = self.coefficients if units == "natural" else self.coded_coefficients
         return equation_text({str(name): value for name, value in coefficients.items()}, digits)
 
@@ -243,7 +235,7 @@ class Surface:
         regions are those of the model before and hold their level (those of the terms that stay cover .77 to
         .93 instead of .95). The p values of the terms that stay ignore the choice.
         """
-        checked_level(alpha)
+        arguments.checked_level(alpha)
         surface = self
         while True:
             p = surface.anova["p"]
@@ -258,7 +250,7 @@ class Surface:
 
         After ``reduce`` the standard error is that of the model before (see ``unselected``).
         """
-        points = checked_points(coded, len(self.design.names))
+        points = arguments.checked_points(coded, len(self.design.names))
         table = pd.DataFrame(points, columns=self.design.names)
         return self._mean(table), self.unselected._standard_error(table)
 
@@ -295,9 +287,13 @@ class Surface:
         DesignError
             A factor without value, a value that is not finite, a level outside 0 to 1.
         """
-        level = checked_level(alpha)
-        table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([checked_map("points", points)])
-        inside = self._coded_table(table, checked_flag("coded", coded))
+        level = arguments.checked_level(alpha)
+        table = (
+            points
+            if isinstance(points, pd.DataFrame)
+            else pd.DataFrame([arguments.checked_map("points", points)])
+        )
+        inside = self._coded_table(table, arguments.checked_flag("coded", coded))
         honest = self.unselected
         center, se = honest.evaluate(inside)
         t = stats.t.isf(0.5 * level, honest.residual_df)
@@ -316,7 +312,7 @@ class Surface:
             named = [factor for factor in self.design.factors if isinstance(factor, Category)]
             table = table.assign(**{factor.name: factor.to_coded(table[factor.name]) for factor in named})
         numbers = {
-            name: real_array(f"the points' values of factor {name!r}", table[name])
+            name: arguments.real_array(f"the points' values of factor {name!r}", table[name])
             for name in self.design.names
         }
         for name, values in numbers.items():
@@ -343,8 +339,8 @@ class Surface:
         self, point: Mapping[str, float], target: Sample, alpha: float = 0.05, coded: bool = False
     ) -> bool:
         """Return True if a target does not contradict one setting: the rule of ``compatible_region``."""
-        one = pd.DataFrame([checked_map("point", point)])
-        inside = self._coded_table(one, checked_flag("coded", coded))
+        one = pd.DataFrame([arguments.checked_map("point", point)])
+        inside = self._coded_table(one, arguments.checked_flag("coded", coded))
         return region.agrees(self, inside.to_numpy(), target, alpha)
 
 
@@ -366,7 +362,7 @@ def fit_surface(design: Design, response: ArrayLike, model: str | Iterable[str] 
         A response that is not finite or does not vary, too few runs for the terms, or terms that the runs
         cannot distinguish.
     """
-    checked_kind("design", design, Design)
+    arguments.checked_kind("design", design, Design)
     coded, values = observations(design, response)
     two_level_factors(design.factors, "a polynomial")
     terms = model_terms(design.names, model) if isinstance(model, str) else parsed_terms(model, design.names)

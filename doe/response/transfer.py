@@ -19,16 +19,7 @@ from scipy import optimize, stats
 from scipy.linalg import block_diag
 from statsmodels.regression.linear_model import GLS
 
-from doe.arguments import (
-    MOST,
-    checked_count,
-    checked_df,
-    checked_kind,
-    checked_level,
-    checked_number,
-    checked_points,
-    real_array,
-)
+from doe import arguments
 from doe.design.design import Design, coded_points, coded_setting, natural_points
 from doe.design.polynomial_terms import INTERCEPT, model_matrix
 from doe.errors import DesignError
@@ -99,7 +90,7 @@ class Transfer:
 
     def intervals(self, alpha: float = 0.05) -> dict[str, tuple[float, float]]:
         """Return the intervals of ``shift`` and ``scale`` that hold with probability 1 - alpha each."""
-        reach = stats.t.isf(0.5 * checked_level(alpha), self.residual_df) * self._fit.bse
+        reach = stats.t.isf(0.5 * arguments.checked_level(alpha), self.residual_df) * self._fit.bse
         return {
             name: (float(value - width), float(value + width))
             for name, value, width in zip(("shift", "scale"), self._fit.params, reach, strict=True)
@@ -107,7 +98,7 @@ class Transfer:
 
     def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return mean and standard error in the other process at coded points, (points, factors)."""
-        points = checked_points(coded, len(self.design.names))
+        points = arguments.checked_points(coded, len(self.design.names))
         own, common = self._columns(points), self._common(points)
         weighed = np.linalg.solve(self._covariance, np.column_stack([self._leftover, common.T]))
         mean = self.level + own @ self._fit.params + common @ weighed[:, 0]
@@ -206,13 +197,13 @@ def transfer(
         Fewer than four runs, a value that is not finite, or runs with equal values of the surface, which
         cannot separate shift from scale.
     """
-    checked_kind("source", source, Surface)
-    checked_kind("runs", runs, pd.DataFrame)
-    values = real_array("a response", response)
+    arguments.checked_kind("source", source, Surface)
+    arguments.checked_kind("runs", runs, pd.DataFrame)
+    values = arguments.real_array("a response", response)
     missing = [name for name in source.design.names if name not in runs.columns]
     if missing:
         raise DesignError(f"no column for factor {missing[0]!r}; the runs have {list(runs.columns)}")
-    natural = {name: real_array(f"the runs' {name!r}", runs[name]) for name in source.design.names}
+    natural = {name: arguments.real_array(f"the runs' {name!r}", runs[name]) for name in source.design.names}
     table = coded_points(source.design.factors, pd.DataFrame(natural))
     points = pd.DataFrame(table)[source.design.names].to_numpy(dtype=np.float64)
     if values.shape != (len(points),):
@@ -221,10 +212,10 @@ def transfer(
         raise DesignError(f"runs must be {LEAST_RUNS} or more, got {len(points)}")
     if not (np.isfinite(values).all() and np.isfinite(points).all()):
         raise DesignError("runs and responses must be finite, got NaN or infinity")
-    distance = np.abs(checked_number("the level", level) - values).max()
+    distance = np.abs(arguments.checked_number("the level", level) - values).max()
     if distance > FARTHEST * max(float(np.ptp(values)), float(np.ptp(source.fitted))):
         raise DesignError(f"the level must be among the responses or near them, got {level:g}")
-    checked_df("scale_sd, the standard deviation of the scale,", scale_sd)
+    arguments.checked_df("scale_sd, the standard deviation of the scale,", scale_sd)
     found = Transfer(source, float(level), points, values, 1.0, 1.0, scale_sd)
     if np.ptp(found._columns(points)[:, 1]) <= 1e-9 * max(1.0, float(np.ptp(source.fitted))):
         raise DesignError(
@@ -277,11 +268,17 @@ def transfer_points(
     turn : int
         Number of the direction along the contour, if there are more than two factors.
     """
-    checked_kind("source", source, Surface)
+    arguments.checked_kind("source", source, Surface)
     names = source.design.names
     origin = coded_setting("at", at, source.design.factors)
-    count, turn = checked_count("count", count, most=MOST), checked_count("turn", turn, least=0)
-    step, extent = checked_number("step", step, above=0.0), checked_number("extent", extent, above=0.0)
+    count, turn = (
+        arguments.checked_count("count", count, most=arguments.MOST),
+        arguments.checked_count("turn", turn, least=0),
+    )
+    step, extent = (
+        arguments.checked_number("step", step, above=0.0),
+        arguments.checked_number("extent", extent, above=0.0),
+    )
     slope = source.quadratic_form.gradient(origin)
     if not np.linalg.norm(slope) > 0.0:
         raise DesignError(f"the surface must rise or fall at the point, got {at}")

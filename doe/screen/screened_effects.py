@@ -10,6 +10,7 @@ from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
 from doe.arguments import checked_choice, checked_flag, checked_kind, checked_level
+from doe.design import polynomial_terms
 from doe.design.anova import (
     ErrorTerm,
     anova_table,
@@ -21,14 +22,6 @@ from doe.design.anova import (
 )
 from doe.design.coefficients import summary_text
 from doe.design.design import Design, observations
-from doe.design.polynomial_terms import (
-    Term,
-    find_term,
-    model_matrix,
-    model_terms,
-    natural_coefficients,
-    term_name,
-)
 from doe.errors import DesignError
 from doe.screen.two_level_effects import LENTH_DRAWS, SEED, orthogonal_null, pseudo_error
 
@@ -94,10 +87,13 @@ class ScreenResult:
     @property
     def coefficients(self) -> pd.Series:
         """The first-order model in natural units."""
-        terms: list[Term] = [(), *model_terms(self.design.names, "first-order")]
+        terms: list[polynomial_terms.Term] = [
+            (),
+            *polynomial_terms.model_terms(self.design.names, "first-order"),
+        ]
         coded = dict(zip(terms, self.coded_coefficients, strict=True))
-        natural = natural_coefficients(coded, self.design.factors)
-        return pd.Series({term_name(term): value for term, value in natural.items()})
+        natural = polynomial_terms.natural_coefficients(coded, self.design.factors)
+        return pd.Series({polynomial_terms.term_name(term): value for term, value in natural.items()})
 
     @cached_property
     def effects(self) -> pd.Series:
@@ -201,7 +197,7 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
     checked_kind("design", design, Design)
     coded, values = observations(design, response)
     blocks = None if design.blocks is None else design.blocks.loc[values.index]
-    columns = model_matrix(coded, model_terms(design.names, "first-order"))
+    columns = polynomial_terms.model_matrix(coded, polynomial_terms.model_terms(design.names, "first-order"))
     center = (coded[design.names] == 0.0).all(axis=1)
     if center.any() and not center.all():  # curvature at the center is not part of the error
         columns["curvature"] = center.to_numpy(dtype=float)
@@ -219,15 +215,15 @@ def aliases(design: Design, interaction: str) -> pd.Series:
     +1/3 means that a third of the interaction is added to that coefficient.
     """
     checked_kind("design", design, Design)
-    product_of = find_term(interaction, _interactions(design))
-    columns = model_matrix(design.coded, [(name,) for name in design.coded.columns])
+    product_of = polynomial_terms.find_term(interaction, _interactions(design))
+    columns = polynomial_terms.model_matrix(design.coded, [(name,) for name in design.coded.columns])
     product = design.coded[list(product_of)].prod(axis=1)
     weights = np.linalg.lstsq(columns.to_numpy(), product.to_numpy(), rcond=None)[0]
-    return pd.Series(weights, index=columns.columns, name=term_name(product_of))
+    return pd.Series(weights, index=columns.columns, name=polynomial_terms.term_name(product_of))
 
 
-def _interactions(design: Design) -> list[Term]:
-    return [term for term in model_terms(design.names, "interaction") if len(term) == 2]
+def _interactions(design: Design) -> list[polynomial_terms.Term]:
+    return [term for term in polynomial_terms.model_terms(design.names, "interaction") if len(term) == 2]
 
 
 def _error_term(

@@ -8,16 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from doe.arguments import (
-    MOST,
-    checked_count,
-    checked_flag,
-    checked_kind,
-    checked_list,
-    checked_map,
-    checked_number,
-    real_array,
-)
+from doe import arguments
 from doe.design.design import Design, coded_points, numbered, observations
 from doe.design.factors import Factor
 from doe.errors import DesignError
@@ -79,17 +70,17 @@ def steepest_path(
     """
     if not isinstance(fit, ScreenResult | Surface):
         raise DesignError(f"fit must be a ScreenResult or a Surface, got {fit!r}")
-    steps = checked_count("steps of a path", steps, most=MOST)
-    chosen = fit.design.names if factors is None else checked_list("factors", factors)
+    steps = arguments.checked_count("steps of a path", steps, most=arguments.MOST)
+    chosen = fit.design.names if factors is None else arguments.checked_list("factors", factors)
     moving = [fit.design.factor(name) for name in chosen]
     if not moving:
         raise DesignError("factors must be one or more, got an empty list")
     names = [factor.name for factor in moving]
-    start = {} if start is None else checked_map("start", start)
-    limits = {} if limits is None else checked_map("limits", limits)
+    start = {} if start is None else arguments.checked_map("start", start)
+    limits = {} if limits is None else arguments.checked_map("limits", limits)
     _check_names(names, step=step if isinstance(step, Mapping) else {}, start=start, limits=limits)
     begin = np.array([_start(factor, start) for factor in moving])
-    sign = -1.0 if checked_flag("descend", descend) else 1.0
+    sign = -1.0 if arguments.checked_flag("descend", descend) else 1.0
     slopes = sign * _gradient(fit, moving, begin)
     if not np.abs(slopes).max() > ROUNDING * fit.coded_coefficients.abs().max():
         raise DesignError(f"no direction to climb: the response has no slope in {', '.join(names)}")
@@ -113,8 +104,8 @@ def climb_table(path: Design, response: ArrayLike, target: float) -> pd.DataFram
 
     A labelled response is read by the path's run labels; the percent of a target of 0 is NaN.
     """
-    target = checked_number("target", target)
-    checked_kind("path", path, Design)
+    target = arguments.checked_number("target", target)
+    arguments.checked_kind("path", path, Design)
     _, values = observations(path, response)
     taken = sorted(set(path.names) & CLIMB_COLUMNS)
     if taken:
@@ -127,7 +118,7 @@ def climb_table(path: Design, response: ArrayLike, target: float) -> pd.DataFram
 
 
 def _start(factor: Factor, start: Mapping[str, float]) -> float:
-    return checked_number(f"the start of {factor.name!r}", start.get(factor.name, factor.center))
+    return arguments.checked_number(f"the start of {factor.name!r}", start.get(factor.name, factor.center))
 
 
 def _gradient(
@@ -155,7 +146,7 @@ def _natural_stride(
 ) -> NDArray[np.float64]:
     """Return the signed natural move of each factor in one step."""
     if not isinstance(step, Mapping):
-        step = checked_number("step", step, above=0.0)
+        step = arguments.checked_number("step", step, above=0.0)
         return step * slopes / np.abs(slopes).max() * np.array([factor.half_range for factor in factors])
     for factor in factors:
         size = step.get(factor.name)
@@ -174,7 +165,9 @@ def _walk(
     limits: Mapping[str, tuple[float, float]],
 ) -> NDArray[np.float64]:
     """Return the natural points of a path inside the limits, shape (points, factors)."""
-    pairs = [real_array(f"the limits of {name!r}", limits.get(name, (-np.inf, np.inf))) for name in names]
+    pairs = [
+        arguments.real_array(f"the limits of {name!r}", limits.get(name, (-np.inf, np.inf))) for name in names
+    ]
     for name, pair in zip(names, pairs, strict=True):
         if pair.shape != (2,):
             raise DesignError(f"the limits of {name!r} must be a low and a high value, got {limits[name]!r}")

@@ -8,19 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from doe.arguments import (
-    MOST,
-    checked_count,
-    checked_flag,
-    checked_kind,
-    checked_list,
-    checked_map,
-    checked_number,
-    checked_seed,
-    real_array,
-)
+from doe import arguments, errors
 from doe.design.design import numbered
-from doe.errors import DesignError
 
 TOLERANCE = 1e-9
 
@@ -47,18 +36,18 @@ class Mixture:
     seed: int | None = None
 
     def __post_init__(self) -> None:
-        checked_kind("shares", self.shares, pd.DataFrame)
-        checked_seed(self.seed)
-        checked_map("lower", self.lower)
+        arguments.checked_kind("shares", self.shares, pd.DataFrame)
+        arguments.checked_seed(self.seed)
+        arguments.checked_map("lower", self.lower)
         for name in self.shares.columns:
-            real_array(f"the shares of {name!r}", self.shares[name])
+            arguments.real_array(f"the shares of {name!r}", self.shares[name])
         if self.shares.empty:
-            raise DesignError("a mixture must have at least one blend, got an empty table")
+            raise errors.DesignError("a mixture must have at least one blend, got an empty table")
         totals = self.shares.sum(axis=1)
         off = totals.index[~((totals - 1.0).abs() <= TOLERANCE)]
         if len(off) or not (self.shares >= -TOLERANCE).all(axis=None):
             place = off[0] if len(off) else self.shares.index[(self.shares < -TOLERANCE).any(axis=1)][0]
-            raise DesignError(
+            raise errors.DesignError(
                 f"shares must not be negative and add up to 1; blend {place} adds up to {totals[place]}"
             )
 
@@ -101,13 +90,13 @@ def simplex_lattice(
         Seed of the run order.
     """
     names = _checked(components)
-    degree = checked_count("degree", degree)
+    degree = arguments.checked_count("degree", degree)
     count = len(names)
-    if math.comb(count + degree - 1, degree) > MOST or (degree + 1) ** count > MOST_TRIED:
-        raise DesignError(f"a lattice of {count} components and degree {degree} has too many blends")
+    if math.comb(count + degree - 1, degree) > arguments.MOST or (degree + 1) ** count > MOST_TRIED:
+        raise errors.DesignError(f"a lattice of {count} components and degree {degree} has too many blends")
     rows = [row for row in itertools.product(range(degree, -1, -1), repeat=count) if sum(row) == degree]
     shares = np.array(rows) / degree
-    if checked_flag("interior", interior):
+    if arguments.checked_flag("interior", interior):
         equal = np.full((1, count), 1.0 / count)
         shares = np.vstack([shares, equal, 0.5 * (np.eye(count) + equal)])
     return _scaled(names, shares, lower, seed)
@@ -129,26 +118,29 @@ def simplex_centroid(
 
 
 def _checked(components: Sequence[str]) -> list[str]:
-    names = checked_list("components", components)
+    names = arguments.checked_list("components", components)
     for name in names:
         if not isinstance(name, str):
-            raise DesignError(f"a component's name must be text, got {name!r}")
+            raise errors.DesignError(f"a component's name must be text, got {name!r}")
     if len(names) < 2 or len(set(names)) < len(names):
-        raise DesignError(f"components must be two or more, all different, got {components!r}")
+        raise errors.DesignError(f"components must be two or more, all different, got {components!r}")
     return names
 
 
 def _scaled(
     names: list[str], shares: np.ndarray, lower: Mapping[str, float] | None, seed: int | None
 ) -> Mixture:
-    lower = {} if lower is None else checked_map("lower", lower)
+    lower = {} if lower is None else arguments.checked_map("lower", lower)
     unknown = [name for name in lower if name not in names]
     if unknown:
-        raise DesignError(f"lower names {unknown[0]!r}, which is no component of {', '.join(names)}")
+        raise errors.DesignError(f"lower names {unknown[0]!r}, which is no component of {', '.join(names)}")
     least = np.array(
-        [checked_number(f"the least share of {name!r}", lower.get(name, 0.0), least=0.0) for name in names]
+        [
+            arguments.checked_number(f"the least share of {name!r}", lower.get(name, 0.0), least=0.0)
+            for name in names
+        ]
     )
     if not least.sum() < 1.0:
-        raise DesignError(f"least shares must not be negative and add up to less than 1, got {lower}")
+        raise errors.DesignError(f"least shares must not be negative and add up to less than 1, got {lower}")
     table = pd.DataFrame(least + (1.0 - least.sum()) * shares, columns=names)
     return Mixture(numbered(table), lower, seed)
