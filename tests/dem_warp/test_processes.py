@@ -55,20 +55,21 @@ def signed(folder: Path, processes: Processes) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def test_processes_stay_from_call_to_call_and_end_with_their_block(tmp_path: Path) -> None:
+def test_processes_stay_from_call_to_call_with_the_same_bits_and_end_with_their_block(
+    alone: list[CaseResult], tmp_path: Path
+) -> None:
     before = multiprocessing.active_children()
+    seen: list[Progress] = []
     with Processes(2) as processes:
         assert multiprocessing.active_children() == before
         first, second = (signed(tmp_path / name, processes) for name in ("first", "second"))
         assert len(first | second) <= 2
+        again = simulate(CASES[::-1], "cpu", processes, on_progress=seen.append)[::-1]
     assert multiprocessing.active_children() == before
-
-
-def test_a_case_has_the_same_bits_in_a_process_that_has_simulated_others(alone: list[CaseResult]) -> None:
-    with Processes(2) as processes:
-        simulate(CASES[:2], "cpu", processes)
-        for one, other in zip(alone, simulate(CASES[::-1], "cpu", processes)[::-1], strict=True):
-            assert_same_result(one, other)
+    for one, other in zip(alone, again, strict=True):
+        assert_same_result(one, other)
+    assert seen[0].total == seen[-1].done == len(CASES)
+    assert seen[0].fraction < seen[-1].fraction == 1.0
 
 
 def test_the_cases_of_a_lost_process_go_on_in_another_one(alone: list[CaseResult], tmp_path: Path) -> None:
@@ -107,13 +108,3 @@ def test_a_script_without_a_guard_is_ended_in_one_sentence(head: str, said: str,
     run = subprocess.run([sys.executable, script], capture_output=True, text=True)
     assert (run.returncode, run.stderr.count("\n")) == ((1, 1) if said else (0, 0))
     assert said in run.stderr
-
-
-def test_each_call_reports_its_own_progress() -> None:
-    seen: list[Progress] = []
-    with Processes(2) as processes:
-        for _ in range(2):
-            seen.clear()
-            simulate(CASES, "cpu", processes, on_progress=seen.append)
-            assert seen[0].total == seen[-1].done == len(CASES)
-            assert seen[0].fraction < seen[-1].fraction == 1.0
