@@ -18,6 +18,8 @@ PACKAGE = "dem_warp"
 CHANGE_NO_HEAP = ("dem_warp/provenance.py", "dem_warp/registry.py", "dem_warp/version.py")
 """Imported files that the fingerprint leaves out."""
 
+_parsed = functools.cache(ast.parse)
+
 
 def engine_fingerprint(*parts: Any) -> str:
     """Return the hash of all code that can change a heap, and of the version of Warp.
@@ -58,7 +60,7 @@ def engine_files() -> dict[str, Path]:
 
 def _imported_files(path: Path) -> Iterator[Path]:
     """Yield the files of dem_warp that a file imports."""
-    for part in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for part in ast.walk(_parsed(path.read_text(encoding="utf-8"))):
         if isinstance(part, ast.ImportFrom) and part.module and _top(part.module) == PACKAGE:
             for module in (part.module, *(f"{part.module}.{alias.name}" for alias in part.names)):
                 file = Path(__file__).parents[1].joinpath(*module.split(".")).with_suffix(".py")
@@ -87,7 +89,7 @@ def source_meaning(text: str) -> str:
 
     Unlike `ast.dump` it is the same in every version of Python: empty fields are left out.
     """
-    return _meaning(ast.parse(text))
+    return _meaning(_parsed(text))
 
 
 def _meaning(part: Any) -> str:

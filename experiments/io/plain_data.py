@@ -12,25 +12,23 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel
 
-from doe import Comparison, Design, JointFit, NoiseFloor, Region, Sample, ScreenResult, Surface
-
-_PROPERTIES: dict[type, tuple[str, ...]] = {
-    Sample: ("mean", "sd", "n", "se"),
-    NoiseFloor: ("confidence", "mean_interval", "sd_interval"),
-    Comparison: (
+_PROPERTIES: dict[str, tuple[str, ...]] = {
+    "Sample": ("mean", "sd", "n", "se"),
+    "NoiseFloor": ("confidence", "mean_interval", "sd_interval"),
+    "Comparison": (
         "a", "b", "method", "difference", "se", "df", "t", "p", "interval", "alpha", "margin",
         "equivalence_p", "equivalent", "smallest_margin",
     ),
-    Design: ("factors", "dummies", "coded", "natural"),
-    ScreenResult: ("table", "anova", "error_rule", "error_df", "error_ms", "effects"),
-    Surface: (
+    "Design": ("factors", "dummies", "coded", "natural"),
+    "ScreenResult": ("table", "anova", "error_rule", "error_df", "error_ms", "effects"),
+    "Surface": (
         "anova", "coefficients", "coded_coefficients", "dropped", "r2", "r2_adjusted", "r2_predicted",
         "cv_percent", "adequate_precision",
     ),
-    Region: ("fraction", "ranges", "extent", "resolution"),
-    JointFit: ("point", "alpha", "extent", "shrinkage", "directions"),
+    "Region": ("fraction", "ranges", "extent", "resolution"),
+    "JointFit": ("point", "alpha", "extent", "shrinkage", "directions"),
 }  # fmt: skip
-"""Properties of each result of `doe` that results.json has."""
+"""Properties of each result of `doe` that results.json has, by class: naming a class loads statsmodels."""
 
 
 def jsonable(value: Any) -> Any:
@@ -56,7 +54,7 @@ def jsonable(value: Any) -> Any:
             return {str(key): jsonable(item) for key, item in value.items()}
         case BaseModel():
             return value.model_dump(mode="json")
-    if type(value) in _PROPERTIES:
+    if type(value).__module__.startswith("doe.") and type(value).__name__ in _PROPERTIES:
         return _properties(value)
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: jsonable(getattr(value, field.name)) for field in fields(value)}
@@ -65,13 +63,14 @@ def jsonable(value: Any) -> Any:
 
 def _properties(value: Any) -> dict[str, Any]:
     """Return the properties of a result of `doe`."""
-    found = {name: jsonable(getattr(value, name)) for name in _PROPERTIES[type(value)]}
-    match value:
-        case NoiseFloor():
+    kind = type(value).__name__
+    found = {name: jsonable(getattr(value, name)) for name in _PROPERTIES[kind]}
+    match kind:
+        case "NoiseFloor":
             return jsonable(value.sample) | found
-        case Surface():
+        case "Surface":
             return found | {"equation": value.equation("natural"), "equation_coded": value.equation("coded")}
-        case JointFit():
+        case "JointFit":
             return found | {"responses": jsonable(value.tests())}
     return found
 
