@@ -11,6 +11,7 @@ import typer
 from experiments.commands.console import clear_errors, messages
 from experiments.commands.options import AsJson
 from experiments.commands.results import print_clump, print_trial
+from experiments.io.errors import InputError
 from experiments.io.units import read_quantity, read_share
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def clump(
             shape, spheres, read_share(tolerance, "--tolerance") if tolerance else None,
             _reach(protrusion, tolerance), unit,
         )  # fmt: skip
-        mass_density = read_quantity(density, "density", "--density") if density else None
+        mass_density = _density(density) if density else None
         with messages.status("Fitting spheres"):
             made = make_clump(request, print_trial if tolerance else lambda trial: None)
         if out:
@@ -81,6 +82,18 @@ def clump(
     else:
         print_clump(made.to_dict(mass_density))
     _print_remarks(made, shape)
+
+
+def _density(text: str) -> float:
+    """Read a density [kg/m^3], and print a doubt about one that no solid has."""
+    from experiments.studyfile.wall_sections import density_doubt
+
+    density = read_quantity(text, "density", "--density")
+    if density <= 0.0:
+        raise InputError("--density", "must be greater than 0", text)
+    if doubt := density_doubt(density, "--density"):
+        messages.print(f"Doubtful: {doubt}")
+    return density
 
 
 def _require_new(out: Path | None, picture: Path | None) -> None:

@@ -31,7 +31,8 @@ UNITS: dict[str, dict[str, float]] = {
 
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "µ": "u", "μ": "u", "°": "deg", "−": "-"})
 _POWER = re.compile(r"\b([a-z]*m)(?:\*\*)?([23])\b")
-_COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?(?:\s+\S.*|[^\s\d].*)?")
+_COMMA = re.compile(r"[+-]?\d+(?:,\d+)+(?:[eE][+-]?\d+)?(?:\s+\S.*|[^\s\d].*)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?![\d.])")
 _TEXT = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
 LONGEST = 100
@@ -53,7 +54,7 @@ class Quantity:
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             quantity = cls(_float(value))
         elif (text := _spelled(value)) and _COMMA.fullmatch(text):
-            raise ValueError(f'must have a decimal point, not a comma: "{text.replace(",", ".", 1)}"')
+            raise ValueError(_comma_problem(text))
         elif text and (match := _TEXT.fullmatch(text)):
             quantity = cls(float(match[1]), _POWER.sub(r"\1^\2", match[2]))
         else:
@@ -87,6 +88,14 @@ class Quantity:
         # Dividing by a whole number gives the float nearest to 28 mm in metres; multiplying by 1e-3 may not.
         inverse = round(1.0 / size) if size < 1.0 else 1
         return self.number / inverse if math.isclose(inverse * size, 1.0) else self.number * size
+
+
+def _comma_problem(text: str) -> str:
+    """Name both readings of a comma: a decimal one, and a separator of thousands."""
+    readings = [text.replace(",", ".")] if text.count(",") == 1 else []
+    readings += [text.replace(",", "")] if _THOUSANDS.match(text) else []
+    shown = " or ".join(f'"{reading}"' for reading in readings) or "one number"
+    return f"must have no comma, but a decimal point if any: {shown}"
 
 
 def _float(value: float) -> float:

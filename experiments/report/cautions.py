@@ -49,7 +49,7 @@ def cautions(campaign: Campaign, study: Study) -> list[Caution]:
 def study_cautions(study: Study) -> list[Caution]:
     """List what limits any values found with a study's heaps, whatever they are compared with."""
     grains = study.case({}, seed=0).scene.grain_count
-    return [*_small(grains), *_narrow(study), *_softened(study)]
+    return [*_small(grains), *_unlikely(study), *_softened(study)]
 
 
 def _twin(campaign: Campaign, study: Study) -> Iterator[Caution]:
@@ -61,7 +61,7 @@ def _heaps(campaign: Campaign, study: Study) -> Iterator[Caution]:
     cases = campaign.cases
     if "grain_count" in cases:
         yield from _small(cases.loc[cases["scene"] == TARGET_SCENE, "grain_count"].median())
-    yield from _narrow(study)
+    yield from _unlikely(study)
 
 
 def _filling(campaign: Campaign, study: Study) -> Iterator[Caution]:
@@ -80,9 +80,9 @@ def _small(grains: float | None) -> Iterator[Caution]:
         yield Caution(say("caution.small", few=FEW_GRAINS), "summary")
 
 
-def _narrow(study: Study) -> Iterator[Caution]:
-    if narrow := study.narrowness():
-        yield Caution(f"{capital(narrow).rstrip('.')}.", "summary")
+def _unlikely(study: Study) -> Iterator[Caution]:
+    for doubt in study.doubts():
+        yield Caution(f"{capital(doubt).rstrip('.')}.", "summary")
 
 
 def _softened(study: Study) -> Iterator[Caution]:

@@ -23,7 +23,13 @@ from experiments.studyfile.scene_sections import SceneSection, scene_section
 from experiments.studyfile.schema import Generated, Length, Number, Section, StudyFile, nested_error
 from experiments.studyfile.sizes_section import SizesSection
 from experiments.studyfile.solver_section import SolverSection
-from experiments.studyfile.wall_sections import InteractionSection, MaterialSection, WallPartSection
+from experiments.studyfile.wall_sections import (
+    LEAST_MODULUS,
+    InteractionSection,
+    MaterialSection,
+    WallPartSection,
+    density_doubt,
+)
 
 LEAST_SIZE, LARGEST_SIZE = 1e-6, 1e6
 """Sizes of grains, as multiples of their shape, whose cubes are numbers of the machine."""
@@ -213,7 +219,7 @@ class Physics(Section):
     @model_validator(mode="after")
     def _container_holds_grains(self) -> Self:
         try:
-            self.narrowness()
+            self.doubts()
         except ValueError as error:
             raise nested_error([{"loc": ("scene",), "type": "value_error", "msg": str(error)}]) from None
         return self
@@ -229,11 +235,24 @@ class Physics(Section):
                 raise nested_error([at]) from None
         return self
 
-    def narrowness(self) -> str:
-        """Say that the container is narrow for its grains; empty where it is not."""
+    @model_validator(mode="after")
+    def _modulus_carries_a_heap(self) -> Self:
+        for name in ("grain", "wall"):
+            modulus = getattr(self, name).shear_modulus / self.numerics.modulus_scale
+            if modulus < LEAST_MODULUS:
+                rule = f"must leave [{name}] a shear modulus of {LEAST_MODULUS / 1e3:g} kPa or more"
+                message = f"{rule}, got {modulus:.2g} Pa"
+                at = {"loc": ("numerics", "modulus_scale"), "type": "value_error", "msg": message}
+                raise nested_error([at])
+        return self
+
+    def doubts(self) -> tuple[str, ...]:
+        """Describe unlikely values: a container that is narrow for its grains, a density of no solid."""
         scene, grains = self.scene.scene(self.wall.material()), self.grain.population()
         size = grains.size_mean if grains.classes is None else grains.size_range[1]
-        return narrowness(getattr(scene, "diameter", None), grains.shape, size)
+        narrow = narrowness(getattr(scene, "diameter", None), grains.shape, size)
+        densities = ((self.grain.density, "grain.density"), (self.wall.density, "wall.density"))
+        return tuple(filter(None, (narrow, *(density_doubt(*each) for each in densities))))
 
     def build_case(self, seed: int) -> Case:
         """Build one case of the engine; raise ValueError where it cannot be, e.g. `GrainCountError`."""

@@ -7,13 +7,27 @@ from pydantic import Field
 from dem_warp import Interaction, Material, WallPart
 from experiments.studyfile.schema import Density, Number, Pressure, Section
 
+LEAST_MODULUS = 1e3
+"""Least shear modulus [Pa], softened or not: the grains of a heap would flow through one another."""
+
+LIKELY_DENSITIES = (50.0, 20_000.0)
+"""Densities of solids [kg/m^3]: expanded minerals have the least, tungsten nearly the largest."""
+
+
+def density_doubt(density: float, place: str) -> str:
+    """Say that a density [kg/m^3] is unlikely for a solid, or nothing."""
+    low, high = LIKELY_DENSITIES
+    if low <= density <= high:
+        return ""
+    return f"{place} of {density:g} kg/m^3 is unlikely: solids have {low:g} to {high:,.0f}"
+
 
 class MaterialSection(Section):
     """Material of a grain or a wall."""
 
     density: Density = Field(gt=0.0)
     """Mass of the solid per volume."""
-    shear_modulus: Pressure = Field(ge=1e3)
+    shear_modulus: Pressure = Field(ge=LEAST_MODULUS)
     """Shear modulus."""
     poisson_ratio: Number = Field(ge=0.0, le=0.5)
     """Poisson's ratio."""
@@ -41,7 +55,7 @@ class WallPartSection(Section):
 
     density: Density | None = Field(default=None, gt=0.0)
     """Mass of the solid per volume."""
-    shear_modulus: Pressure | None = Field(default=None, ge=1e3)
+    shear_modulus: Pressure | None = Field(default=None, ge=LEAST_MODULUS)
     """Shear modulus."""
     poisson_ratio: Number | None = Field(default=None, ge=0.0, le=0.5)
     """Poisson's ratio."""

@@ -179,7 +179,11 @@ class StudyFolder:
         try:
             with self._draft_file(file, text) as path:
                 study = load_study(path)
-                found = {"note": study.note, "doubtful": study.narrowness(), "scales": study_scales(path)}
+                found = {
+                    "note": study.note,
+                    "doubtful": "; ".join(study.doubts()),
+                    "scales": study_scales(path),
+                }
         except InputError as error:
             return problems_of(error)
         return found

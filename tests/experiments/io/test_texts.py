@@ -79,9 +79,19 @@ def test_units_are_known_as_people_write_them(text: str, dimension: str, value: 
     assert Quantity.parse(text).to_base(dimension) == pytest.approx(value, rel=3e-16)
 
 
-@pytest.mark.parametrize("text", ["28,5 mm", " -1,2e3 kg/m3"])
-def test_a_decimal_comma_is_reported(text: str) -> None:
-    with pytest.raises(ValueError, match=r"decimal point, not a comma: \"" + text.strip().replace(",", ".")):
+@pytest.mark.parametrize(
+    ("text", "readings"),
+    [
+        ("28,5 mm", '"28.5 mm"'),
+        (" -1,2e3 kg/m3", '"-1.2e3 kg/m3"'),
+        ("1,250 kg/m^3", '"1.250 kg/m^3" or "1250 kg/m^3"'),
+        ("1,250,000 Pa", '"1250000 Pa"'),
+        ("0,250 mm", '"0.250 mm"'),
+        ("1,25,0 mm", "one number"),
+    ],
+)
+def test_both_readings_of_a_comma_are_named(text: str, readings: str) -> None:
+    with pytest.raises(ValueError, match=f"decimal point if any: {re.escape(readings)}$"):
         Quantity.parse(text)
 
 
@@ -129,6 +139,15 @@ def test_a_narrow_tube_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "s.toml"
     for diameter, said in (("28 mm", ""), ("14 mm", "3.5 lengths")):
         path.write_text(SMALL_STUDY.replace('diameter = "28 mm"', f'diameter = "{diameter}"'), "utf-8")
-        narrow = load_study(path).narrowness()
-        assert said in narrow
-        assert bool(narrow) is bool(said)
+        doubts = load_study(path).doubts()
+        assert len(doubts) == bool(said)
+        assert all(said in doubt for doubt in doubts)
+
+
+@pytest.mark.parametrize(("density", "doubts"), [("1.250", 1), ("50", 0), ("7850", 0), ("78500", 1)])
+def test_a_density_of_no_solid_is_doubted(density: str, doubts: int, tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(re.sub(r'density = "\d+', f'density = "{density}', SMALL_STUDY, count=1), "utf-8")
+    found = load_study(path).doubts()
+    assert len(found) == doubts
+    assert all(one.startswith("grain.density") for one in found)

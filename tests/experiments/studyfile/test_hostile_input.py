@@ -173,6 +173,9 @@ HOSTILE = {
     "comma for the protrusion": Hostile(
         "clump sphere:2 --spheres 1 --protrusion 0,1mm", ("--protrusion", "comma", "0,1mm")
     ),
+    "a negative density": Hostile(
+        "clump sphere:2 --spheres 1 --density -3kg/m3", ("--density", "greater than 0", "-3kg/m3")
+    ),
     "two bodies": clump(
         TWO_BODIES, "g.stl", "one closed body", "2 bodies", options="--spheres 3", name="g.stl"
     ),

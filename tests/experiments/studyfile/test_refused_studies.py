@@ -92,6 +92,9 @@ REFUSED = [
     changed(
         "poisson_ratio = 0.25", "poisson_ratio = 0.7", "grain.poisson_ratio", "less than or equal to 0.5"
     ),
+    changed(
+        "modulus_scale = 400.0", "modulus_scale = 1e12", "numerics.modulus_scale", "modulus of 1 kPa or more"
+    ),
     changed('sd = "0.5 deg"\n', "", "target", "missing: sd"),
     changed("low = 0.2", "low = 0.9", "factor[1]", "low must be below high"),
     changed("low = 0.2", "low = -0.2", "factor[1]", "must stay within 0"),
