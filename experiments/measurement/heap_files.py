@@ -17,7 +17,7 @@ from experiments.io.errors import InputError
 from experiments.io.units import read_quantity
 from experiments.studyfile.study import MeasurementSection
 from imaging import Doubt, HeapAngle, PictureError, ReposeAngle, heap_angle, overlay, snapshot
-from imaging.drawing.ground import REST, find_ground
+from imaging.drawing.ground import REST, find_ground, height_is_along_y
 from imaging.geometry import Picture, Spheres
 from imaging.photo.doubts import GREATEST_ANGLE, LEAST_ANGLE, ROUGH_EDGE
 
@@ -26,8 +26,8 @@ DEFAULT_UNIT = "m"
 """Unit of a heap's file without a unit; angles do not depend on it."""
 BELOW = 0.5
 """Depth under the plate, in radii, of a sphere that fell off it."""
-LEAST_PLANE, PLANE = 20, 0.9
-"""Fewest spheres with exactly the same coordinate that are mentioned, and their least share of those within
+LEAST_PLANE, PLANE_OF_ALL, PLANE = 20, 0.02, 0.9
+"""Fewest spheres in one plane that are mentioned, also as a part of all, and their least part of those within
 `REST`: of equal grains on a plate of LIGGGHTS, LAMMPS and Yade, half have one depth in six digits."""
 
 
@@ -95,7 +95,7 @@ def _notes(file: SphereFile, settings: HeapSettings) -> list[str]:
         along = file.spheres[:, axis]
         [(place, many)] = Counter(along.tolist()).most_common(1)
         near = np.count_nonzero(np.abs(along - place) < REST * np.median(file.spheres[:, 3]))
-        if many >= LEAST_PLANE and many > PLANE * near:
+        if many >= max(LEAST_PLANE, PLANE_OF_ALL * len(along)) and many > PLANE * near:
             inside = file.chosen(along == place).type_counts
             of_type = f" of type {', '.join(inside)}" if inside else ""
             notes.append(f"{many} spheres{of_type} have the same {name}, {place:.4g}: a floor or a wall?")
@@ -110,6 +110,9 @@ def _measured(
         raise InputError(f"{path}, --unit", problem, f"{settings.unit:g} m")
     size = settings.unit or file.unit or length_unit(DEFAULT_UNIT)
     spheres = Spheres.of(file.spheres[:, :3] * size, file.spheres[:, 3] * size)
+    if along_y := height_is_along_y(spheres):
+        x, y, z = spheres.centers.T
+        spheres = Spheres(np.column_stack([x, -z, y]), spheres.radii)
     height = find_ground(spheres) if settings.plate_height is None else settings.plate_height
     standing = spheres.centers[:, 2] > height - BELOW * spheres.radii
     if not standing.any():
@@ -124,6 +127,8 @@ def _measured(
         + ("" if file.bodies is None else f" in {bodies} grains"),
         f"plate {'found' if settings.plate_height is None else 'given'} at {1e3 * height:.4g} mm",
     ]
+    if along_y:
+        parts.append("height seems to be along y, and is read so")
     if fallen := int(np.count_nonzero(~standing)):
         parts.append(f"{fallen} below it left out")
     return MeasuredHeap(angle, "; ".join((*parts, *notes)), heap)

@@ -7,6 +7,7 @@ import os
 import warnings
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,6 +21,14 @@ LARGEST_FILE = 500_000_000
 """Size of the largest file that is read [bytes]."""
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 HEIC_ENDINGS = (".heic", ".heif")
+RAW_ENDINGS = (
+    ".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dcr", ".dng", ".erf", ".iiq", ".kdc", ".mef", ".mos", ".mrw",
+    ".nef", ".nrw", ".orf", ".pef", ".raf", ".raw", ".rw2", ".rwl", ".sr2", ".srf", ".srw", ".x3f",
+)  # fmt: skip
+KIND_TAG, DNG_TAG = 254, 50706
+"""TIFF tags: 1 for a smaller copy of another picture of the file; version of DNG."""
+SENSOR_BITS, LARGEST_16_BIT = (10, 12, 14), (1 << 16) - 1
+"""Bits of cameras that save in files of 16 bits."""
 FILM_DIAGONAL = math.hypot(36.0, 24.0)
 """Diagonal of the 35 mm film that cameras' focal lengths are converted to [mm]."""
 FOCAL_LENGTH_TAG, WIDTH_TAG, HEIGHT_TAG, CAMERA_TAGS = 0xA405, 0xA002, 0xA003, 0x8769
@@ -46,17 +55,33 @@ def read_picture(path: str | Path) -> Picture:
         raise PictureError(str(path), problem)
     if file.suffix.lower() in HEIC_ENDINGS:
         return _read_heic(file)
+    if file.suffix.lower() in RAW_ENDINGS:
+        raise _raw(file)
     if (length := file.stat().st_size) > LARGEST_FILE:
         raise PictureError(str(path), f"must have at most {LARGEST_FILE:,} bytes", f"{length:,}")
     # a file without a size in its header is not decoded: it may have any
     size, picture, content = _claimed_size(file), None, file.read_bytes()
-    if size is not None and _holds_its_chunks(content):
+    if size is None:
+        raise PictureError(
+            str(path), "not a picture in a known format (PNG, JPEG, TIFF, ...)", f"{length} bytes"
+        )
+    if _holds_its_chunks(content):
         _check_size(size, str(path))
         with suppress(cv2.error):
-            picture = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_COLOR)
+            picture = _decoded(np.frombuffer(content, dtype=np.uint8))
     if picture is None:
-        raise PictureError(str(path), f"not a picture that OpenCV can read ({length} bytes)")
+        raise PictureError(str(path), f"the picture is damaged or cut off ({length} bytes)")
     return picture.astype(np.uint8, copy=False)
+
+
+def _decoded(content: Picture) -> Any:
+    """Decode a picture to eight bits; values of fewer bits in a file of 16 bits are scaled."""
+    deep: Any = cv2.imdecode(content, cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
+    brightest = int(deep.max()) if deep is not None and deep.dtype == np.uint16 else LARGEST_16_BIT
+    bits = next((bits for bits in SENSOR_BITS if brightest < 1 << bits), 16)
+    if deep is None or bits == 16:
+        return cv2.imdecode(content, cv2.IMREAD_COLOR)
+    return (deep >> (bits - 8)).astype(np.uint8)
 
 
 def _read_heic(file: Path) -> Picture:
@@ -84,19 +109,30 @@ def _too_large(place: str, size: str) -> PictureError:
     return PictureError(place, problem, size)
 
 
+def _raw(file: Path) -> PictureError:
+    return PictureError(str(file), "is a camera's RAW file: develop it, and save it as JPEG, PNG or TIFF")
+
+
 def _claimed_size(file: Path) -> tuple[int, int] | None:
-    """Read columns and rows from a file's header, without decoding it; None without a known header."""
+    """Read columns and rows from a file's header, without decoding it; None without a known header.
+
+    Raise PictureError for a camera's RAW file based on TIFF, whose first picture is a thumbnail.
+    """
     from PIL import Image
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(file) as image:
-                return image.size
+                tags = getattr(image, "tag_v2", {})
+                size, is_raw = image.size, bool(tags.get(KIND_TAG, 0) & 1 or DNG_TAG in tags)
     except Image.DecompressionBombError:
         raise _too_large(str(file), "several times as many") from None
     except BROKEN:
         return None
+    if is_raw:
+        raise _raw(file)
+    return size
 
 
 def _holds_its_chunks(content: bytes) -> bool:

@@ -77,3 +77,38 @@ def test_a_near_camera_is_corrected_by_its_focal_length(tmp_path: Path) -> None:
     # Cut to another size than the camera's, a picture no longer has its angle of view.
     assert focal_length(with_focal_length(tmp_path / "cut.jpg", picture, 26, (4000, 3000))) is None
     assert focal_length(save_picture(tmp_path / "none.png", picture)) is None
+
+
+@pytest.mark.parametrize("bits", [10, 12, 14])
+def test_the_bits_of_a_camera_in_a_file_of_16_bits_are_scaled(tmp_path: Path, bits: int) -> None:
+    eight = draw(DrawnHeap(30, 30))
+    deep = eight.astype(np.uint16) << (bits - 8)
+    assert deep.max() >= 1 << (bits - 2)
+    assert np.array_equal(read_picture(save_picture(tmp_path / "deep.png", deep)), eight)
+
+
+def test_a_picture_of_16_bits_keeps_its_upper_eight(tmp_path: Path) -> None:
+    deep = draw(DrawnHeap(30, 30)).astype(np.uint16) << 8
+    read = read_picture(save_picture(tmp_path / "deep.tif", deep))
+    # the library may round the lower eight bits
+    assert np.abs(read.astype(int) - (deep >> 8)).max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("name", "tags"), [("a.tif", {254: 1}), ("b.tif", {50706: b"\1\4\0\0"}), ("c.nef", {})]
+)
+def test_a_raw_file_is_not_measured_on_its_thumbnail(tmp_path: Path, name: str, tags: dict) -> None:
+    Image.fromarray(draw(DrawnHeap(30, 30))).save(tmp_path / name, format="TIFF", tiffinfo=tags)
+    with pytest.raises(PictureError, match="RAW file: develop it"):
+        read_picture(tmp_path / name)
+
+
+@pytest.mark.parametrize("content", [b"", b"units si\natom_style sphere\n", bytes(range(256))])
+def test_a_file_that_is_no_picture_is_not_called_one(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "heap.png").write_bytes(content)
+    with pytest.raises(PictureError, match="not a picture in a known format"):
+        read_picture(tmp_path / "heap.png")
+    cut = save_picture(tmp_path / "cut.png", draw(DrawnHeap(30, 30)))
+    cut.write_bytes(cut.read_bytes()[:60])
+    with pytest.raises(PictureError, match="damaged or cut off"):
+        read_picture(cut)

@@ -6,6 +6,7 @@ parts of the box.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,6 +18,8 @@ from experiments.io.errors import InputError
 
 PLACES = ("x", "xu", "xs", "xsu")
 """Columns of a place, in order of preference."""
+_SIZE = re.compile(r"(?:[vcfd]_)?(?:radius|diameter)|[vcfd]_(?:r|rad|d|diam)")
+"""Column of the size: an attribute, or a variable, compute, fix or own property with such a name."""
 BODIES = ("id_multisphere", "mol")
 """Columns of a clump's number."""
 UNITS_OF = {"si": 1.0, "cgs": 1e-2, "micro": 1e-6, "nano": 1e-9}
@@ -99,14 +102,16 @@ def _read(path: Path) -> SphereFile:
 def _columns(names: list[str], place: str) -> tuple[Columns, bool]:
     """Find the columns of the numbers; return them, and True if positions are parts of the box."""
     start = next((name for name in PLACES if all(axis + name[1:] in names for axis in "xyz")), None)
-    size = next((name for name in ("radius", "diameter") if name in names), None)
+    size = next((name for name in names if _SIZE.fullmatch(name)), None)
     if start is None or size is None:
         problem = "needs the columns x y z (or xu, xs) and radius (or diameter)"
-        raise InputError(place, problem, " ".join(names) or "no columns")
+        hint = "Add radius to the dump's columns; a variable v_radius will do."
+        raise InputError(place, problem, " ".join(names) or "no columns", hint)
     x, y, z = (names.index(axis + start[1:]) for axis in "xyz")
     body = next((names.index(name) for name in BODIES if name in names), None)
     types = names.index("type") if "type" in names else None
-    return Columns(x, y, z, names.index(size), size == "diameter", body, types), start in ("xs", "xsu")
+    is_diameter = size.rpartition("_")[2].startswith("d")
+    return Columns(x, y, z, names.index(size), is_diameter, body, types), start in ("xs", "xsu")
 
 
 def _box(frame: _Frame, place: str) -> tuple[np.ndarray, np.ndarray]:

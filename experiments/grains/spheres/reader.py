@@ -32,11 +32,16 @@ GZIP = b"\x1f\x8b"
 """First bytes of a file that is compressed by gzip."""
 
 _VIDEO = ("a video", "Save one frame as PNG or JPEG.")
+_PACKED = ("a compressed file", "Decompress it, or compress it by gzip.")
 OTHERS = {
     "LAMMPSCUSTOM": ("a binary dump of LAMMPS", "Write a text dump: a name that does not end in .bin."),
     "DUMPCUSTOM": ("a binary dump of LAMMPS", "Write a text dump: a name that does not end in .bin."),
     "\x89HDF": ("an HDF5 file", "Export centres and radii as VTK or CSV."),
     "CDF": ("a NetCDF file", "Export centres and radii as VTK or CSV."),
+    "BZh": _PACKED,
+    "\x28\xb5\x2f\xfd": _PACKED,
+    "\xfd7zXZ": _PACKED,
+    "7z\xbc\xaf": _PACKED,
     "%PDF": ("a PDF", "Save its picture as PNG or JPEG."),
     "PK\x03\x04": (
         "a ZIP archive or an Office document",
@@ -45,7 +50,10 @@ OTHERS = {
     "ftypisom": _VIDEO,
     "ftypmp4": _VIDEO,
     "ftypqt": _VIDEO,
+    "ftypM4V": _VIDEO,
+    "ftyp3g": _VIDEO,
     "AVI LIST": _VIDEO,
+    "\0\0\1\xba": _VIDEO,
     "\x1aE\xdf\xa3": _VIDEO,
 }
 """Names of other formats, with a hint, by a mark in their first 32 bytes."""

@@ -160,7 +160,7 @@ def test_a_chunk_of_a_picture_that_claims_much_is_not_decoded(
     path.write_bytes(whole[:at] + (2**31 - 1).to_bytes(4) + whole[at + 4 :])
     # OpenCV would take two gigabytes for it, and then refuse it
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
-    with pytest.raises(PictureError, match="a picture that OpenCV can read"):
+    with pytest.raises(PictureError, match="damaged or cut off"):
         read_picture(path)
 
 

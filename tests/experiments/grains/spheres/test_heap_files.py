@@ -233,3 +233,23 @@ def test_types_are_read_from_every_format_that_has_them(name: str, tmp_path: Pat
     read = read_spheres(path)
     assert read.type_counts == {"1": 1, "2": 2}
     assert read.of_types(["2"], "").spheres[:, :2].tolist() == [[1.0, 0.0], [0.0, 1.0]]
+
+
+def test_a_heap_whose_height_is_along_y_is_read_so(tmp_path: Path) -> None:
+    heap = read_spheres(DATA / "lammps_scaled.dump").spheres
+    [upright] = measured(DATA / "lammps_scaled.dump")
+    np.savez(tmp_path / "y.npz", position=heap[:, [0, 2, 1]] * [1, 1, -1], radius=heap[:, 3])
+    [row] = measured(tmp_path / "y.npz")
+    assert (row["mean"], row["se"]) == pytest.approx((upright["mean"], upright["se"]), abs=1e-9)
+    assert "height seems to be along y" in row["source"]
+    assert "along y" not in upright["source"]
+
+
+@pytest.mark.parametrize("column", ["v_radius", "v_r", "c_diameter", "f_d", "d_rad"])
+def test_the_size_of_a_dump_may_be_a_variable(tmp_path: Path, column: str) -> None:
+    text = (DATA / "liggghts_spheres.dump").read_text("utf-8")
+    factor = 0.5 if column in ("c_diameter", "f_d") else 1.0
+    path = tmp_path / "heap.dump"
+    path.write_text(text.replace("radius", column), "utf-8")
+    spheres = read_spheres(DATA / "liggghts_spheres.dump").spheres
+    assert read_spheres(path).spheres == pytest.approx(spheres * [1, 1, 1, factor])
