@@ -35,6 +35,9 @@ def _start_warp() -> None:
         os.dup2(aside.fileno(), 2)
         try:
             wp.init()
+        except OSError as error:
+            rule = "Warp cannot write its kernel cache, set WARP_CACHE_PATH to another folder"
+            raise OSError(error.errno, rule, error.filename) from error
         finally:
             os.dup2(kept, 2)
             os.close(kept)

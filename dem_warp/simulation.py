@@ -1,6 +1,5 @@
 """Simulation of many cases: on a GPU all worlds in one batch, on a CPU one world per process."""
 
-import os
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -12,7 +11,7 @@ from dem_warp.batch import OnAdvance, begin
 from dem_warp.case import Case
 from dem_warp.checkpoint import CHECKPOINT_EVERY, Checkpoints
 from dem_warp.device import resolve_device
-from dem_warp.processes import REPORT_EVERY, Processes, Report
+from dem_warp.processes import REPORT_EVERY, Processes, Report, cores
 from dem_warp.result import CaseResult, OnProgress, OnResult, Progress
 
 
@@ -83,7 +82,7 @@ def _processes(workers: int | Processes | None, cases: int) -> AbstractContextMa
     """Return processes for one call, or those of the caller, who ends them."""
     if isinstance(workers, Processes):
         return nullcontext(workers)
-    return Processes(min(workers or os.cpu_count() or 1, cases))
+    return Processes(min(workers or cores(), cases))
 
 
 def _run_batches(

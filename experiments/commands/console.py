@@ -144,8 +144,10 @@ def clear_errors(advice: object = "") -> Iterator[None]:
             fail(f"there is not enough memory: use fewer --workers. {advice}", FAILED_RUN)
         except OSError as error:
             place = f"{error.filename}: " if error.filename is not None else ""
-            way_out = WAYS_OUT.get(error.errno or 0, "check the file, or choose another")
-            fail(f"{place}{error.strerror or error}: {way_out}. {advice}", FAILED_RUN)
+            way_out = f": {WAYS_OUT.get(error.errno or 0, 'check the file, or choose another')}"
+            if error.errno and error.strerror != os.strerror(error.errno):
+                way_out = ""  # its raiser says what to do
+            fail(f"{place}{error.strerror or error}{way_out}. {advice}", FAILED_RUN)
         except ValueError as error:
             if not _is_input(error):
                 raise

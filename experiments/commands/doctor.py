@@ -32,13 +32,14 @@ def doctor(
     """
     with clear_errors():
         from experiments.runs.choices import chosen_resources
-        from experiments.runs.examination import examine, measure_speed
+        from experiments.runs.examination import examine, kernel_cache, measure_speed
 
+        cache = kernel_cache()
         resources = chosen_resources(device, workers, scheduler, cluster)
         if measure:
             messages.print(f"Simulating one batch of the paper's study on {resources}.")
             measure_speed(resources)
-        findings = examine(resources)
+        findings = examine(resources, cache)
     if as_json:
         typer.echo(json.dumps([finding.to_dict() for finding in findings], allow_nan=False))
     else:
@@ -52,3 +53,5 @@ def _print(findings: list[Finding]) -> None:
     for finding in findings:
         mark = "ok  " if finding.good else "FAIL" if finding.needed else "-   "
         typer.echo(plain(f"{mark} {finding.name:{width}}  {finding.text}"))
+        if finding.cure:
+            typer.echo(plain(f"     {'':{width}}  {finding.cure}"))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import platform
+import re
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -24,9 +26,11 @@ from dem_warp import (
     simulate,
 )
 from dem_warp.device import resolve_device
+from dem_warp.processes import cores
 from experiments.cases import Resources, open_workers
 from experiments.cases.forecast.speed import UNKNOWN, noted_speed, source_of
 from experiments.cases.workers.opening import EXTRA, missing_libraries
+from experiments.cases.workers.resources import PROCESS_BYTES
 from experiments.cases.workers.submissions import submit_command
 from experiments.io.program_version import program_version
 from experiments.runs.choices import BENCH, PAPER
@@ -35,6 +39,13 @@ from imaging.drawing.opengl import opengl_works
 
 GPU_WORLDS = 32
 """Worlds on a GPU of the batch that measures its speed: as many as in a stage of most campaigns."""
+
+USUAL = {False: (2e6, 5e7), True: (2e8, 2e10)}
+"""Normal speeds of a worker on a core and on a GPU [sphere-steps/s]: 2 and 10 million on busy and quiet cores
+of servers, 7,000 million on an H200 with the paper's heaps."""
+
+DEVICES, NVIDIA, MEMORY = Path("/sys/bus/pci/devices"), "0x10de", Path("/proc/meminfo")
+"""Linux's list of devices, NVIDIA's number in it, and Linux's account of the memory."""
 
 
 @dataclass(frozen=True)
@@ -46,30 +57,48 @@ class Finding:
     text: str
     needed: bool = False
     """True if no case can be simulated without it."""
+    cure: str = ""
+    """What a person can do where it is not good, or what is normal."""
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as JSON-able data."""
         return asdict(self)
 
 
-def examine(resources: Resources) -> list[Finding]:
-    """Check everything that simulates or draws, and try both on a small heap."""
-    resolve_device(None)
+def examine(resources: Resources, cache: Finding) -> list[Finding]:
+    """Check everything that simulates or draws, and try both on a small heap; see `kernel_cache`."""
     versions = f"dem-warp {program_version()}, Warp {wp.__version__}, Python {platform.python_version()}"
-    speed = noted_speed(resources.machine)
     return [
         Finding("versions", True, versions),
-        *_gpus(),
-        Finding("cores", True, f"{cores()} for this process, {_processor()}"),
-        _memory(),
-        _kernels(),
-        _tried("simulation", _simulates, needed=True),
-        _opengl(),
-        _dask(),
-        *_submission(resources),
+        *_tried("GPU", _gpus),
+        *_tried("cores", _cores),
+        *_tried("memory", lambda: [_memory(resources)]),
+        cache,
+        *_tried("simulation", _simulation, needed=True),
+        *_tried("OpenGL", lambda: [_opengl()]),
+        *_tried("clusters", lambda: [_dask()]),
+        *_tried("jobs", lambda: _submission(resources)),
         Finding("will be used", True, _used(resources)),
-        Finding("speed", speed is not None, _speed_text(speed)),
+        *_tried("speed", lambda: [_speed(resources)]),
     ]
+
+
+def kernel_cache() -> Finding:
+    """Start Warp, and check that its kernel cache can be written; if not, a temporary one serves."""
+    try:
+        resolve_device(None)
+        folder = Path(str(wp.config.kernel_cache_dir))
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 1e6
+        return Finding("kernel cache", True, f"{folder}, {size:.0f} MB", needed=True)
+    except OSError as error:
+        wp.config.kernel_cache_dir = tempfile.mkdtemp(prefix="dem-warp-")
+        atexit.register(shutil.rmtree, wp.config.kernel_cache_dir, ignore_errors=True)
+        resolve_device(None)
+        text = f"{error.filename}: {error.strerror or error}"
+        cure = "Set WARP_CACHE_PATH to a folder that can be written."
+        return Finding("kernel cache", False, text, needed=True, cure=cure)
 
 
 def _used(resources: Resources) -> str:
@@ -77,65 +106,100 @@ def _used(resources: Resources) -> str:
     return f"{resources}, {resources.count} at once; the paper's study at the scale {scale}"
 
 
-def cores() -> int:
-    """Count the cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+def _cores() -> list[Finding]:
+    here, there = cores(), os.cpu_count() or 1
+    limit = " (taskset, a container or a job allows no more)" if here < there else ""
+    name = platform.processor() or platform.machine()
+    return [Finding("cores", True, f"{here} of {there} for this process{limit}, {name}")]
 
 
 def _gpus() -> list[Finding]:
     gpus = wp.get_cuda_devices()
+    least = min(wp.get_cuda_supported_archs(), default=0)
     if not gpus:
-        return [Finding("GPU", False, "no NVIDIA GPU with a CUDA driver: cases run on the CPU")]
+        return [_no_gpu(least)]
     driver = ".".join(map(str, wp.get_cuda_driver_version() or ("unknown",)))
     found = []
     for gpu in gpus:
         free, there = gpu.free_memory / 1e9, gpu.total_memory / 1e9
-        text = f"{gpu.name}, {free:.3g} of {there:.3g} GB free, driver {driver}"
-        found.append(Finding(str(gpu.alias), True, text))
+        memory = f"{free:.3g} of {there:.3g} GB free"
+        text = f"{gpu.name}, {memory}, compute capability {gpu.arch / 10:.1f}, driver of CUDA {driver}"
+        old = gpu.arch < least
+        cure = f"Warp {wp.__version__} needs {least / 10:.1f} or later. Use --device cpu." if old else ""
+        found.append(Finding(str(gpu.alias), not old, text, cure=cure))
     return found
 
 
-def _processor() -> str:
-    return platform.processor() or platform.machine()
+def _no_gpu(least: int) -> Finding:
+    """Say why Warp has no GPU, and what it needs."""
+    on_cpu = "cases run on the CPU"
+    if not (toolkit := wp.get_cuda_toolkit_version()):
+        return Finding("GPU", False, f"this Warp was built without CUDA: {on_cpu}")
+    needs = (
+        f"Warp {wp.__version__} needs a driver of CUDA {toolkit[0]}.0 or later,"
+        f" and a card of compute capability {least / 10:.1f} or later."
+    )
+    if driver := wp.get_cuda_driver_version():
+        version = ".".join(map(str, driver))
+        if driver < (toolkit[0], 0):
+            text, cure = f"the driver of CUDA {version} is too old", f"Update NVIDIA's driver. {needs}"
+        elif (visible := os.environ.get("CUDA_VISIBLE_DEVICES")) is not None:
+            text, cure = f"CUDA_VISIBLE_DEVICES={visible} hides every GPU", "Unset it."
+        else:
+            text, cure = f"the driver of CUDA {version} finds no GPU", "See what nvidia-smi prints."
+    elif "microsoft" in platform.release().lower():
+        text = "no NVIDIA driver in WSL"
+        cure = f"Install NVIDIA's driver in Windows, not in Linux, then run wsl --update. {needs}"
+    elif _has_nvidia_card():
+        text, cure = "an NVIDIA card without a driver that works", f"Install NVIDIA's driver. {needs}"
+    else:
+        text, cure = "no NVIDIA GPU", f"None is needed. {needs}"
+    return Finding("GPU", False, f"{text}: {on_cpu}", cure=cure)
 
 
-def _memory() -> Finding:
+def _has_nvidia_card() -> bool:
+    """Look for a display controller of NVIDIA on Linux's list of devices."""
+    made_by_nvidia = (one for one in DEVICES.glob("*") if _text_of(one / "vendor").strip() == NVIDIA)
+    return any(_text_of(device / "class").startswith("0x03") for device in made_by_nvidia)
+
+
+def _memory(resources: Resources) -> Finding:
     try:
         page = os.sysconf("SC_PAGE_SIZE")
-        there, free = (page * os.sysconf(name) / 1e9 for name in ("SC_PHYS_PAGES", "SC_AVPHYS_PAGES"))
+        there, free = (page * os.sysconf(name) for name in ("SC_PHYS_PAGES", "SC_AVPHYS_PAGES"))
     except (AttributeError, ValueError, OSError):
         return Finding("memory", True, "unknown on this system")
-    return Finding("memory", True, f"{there:.3g} GB, {free:.3g} GB of it unused")
+    if available := re.search(r"MemAvailable:\s+(\d+) kB", _text_of(MEMORY)):
+        free = 1024 * int(available[1])  # with what the system's cache would give back
+    needed = PROCESS_BYTES * (resources.count + 1)
+    text = f"{there / 1e9:.3g} GB, {free / 1e9:.3g} GB available"
+    cure = f"{resources} needs {needed / 1e9:.2g} GB. Close other programs, or lower --workers."
+    return Finding("memory", free >= needed, text, cure="" if free >= needed else cure)
 
 
-def _kernels() -> Finding:
-    """Check that the kernel cache is writable."""
-    folder = Path(str(wp.config.kernel_cache_dir))
-    size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 1e6
+def _text_of(path: Path) -> str:
+    return path.read_text(encoding="ascii") if path.is_file() else ""
+
+
+def _tried(name: str, check: Callable[[], list[Finding]], needed: bool = False) -> list[Finding]:
+    """Check something; an error is the finding."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        return Finding("kernel cache", False, f"{folder}: {error.strerror or error}", needed=True)
-    return Finding("kernel cache", True, f"{folder}, {size:.0f} MB", needed=True)
-
-
-def _tried(name: str, what: Callable[[], str], needed: bool = False) -> Finding:
-    """Try something; an error is the finding."""
-    try:
-        return Finding(name, True, what(), needed)
+        return check()
     except Exception as error:
-        return Finding(name, False, f"{type(error).__name__}: {error}".splitlines()[0], needed)
+        return [Finding(name, False, f"{type(error).__name__}: {error}".splitlines()[0], needed)]
 
 
-def _simulates() -> str:
-    [result] = simulate([_thirty_balls()], workers=1)
-    if result.status != "finished":
-        raise RuntimeError(f"a heap of 30 spheres {result.status}: {result.reason}")
-    return f"a heap of 30 spheres on {result.provenance['device']} came to rest"
+def _simulation() -> list[Finding]:
+    cure = "" if resolve_device(None) == "cpu" else "Use --device cpu, or update the driver."
+    try:
+        [result] = simulate([_thirty_balls()], workers=1)
+    except Exception as error:
+        text = f"{type(error).__name__}: {error}".splitlines()[0]
+        return [Finding("simulation", False, text, needed=True, cure=cure)]
+    text = f"a heap of 30 spheres on {result.provenance['device']} "
+    good = result.status == "finished"
+    end = "came to rest" if good else f"{result.status}: {result.reason}"
+    return [Finding("simulation", good, f"{text}{end}", needed=True, cure="" if good else cure)]
 
 
 def _thirty_balls() -> Case[LiftedCylinder]:
@@ -157,14 +221,14 @@ def measure_speed(resources: Resources) -> None:
 def _opengl() -> Finding:
     if opengl_works():
         return Finding("OpenGL", True, "draws off screen")
-    return Finding("OpenGL", False, "does not draw off screen: silhouettes are drawn without it, more slowly")
+    text = "does not draw off screen: silhouettes are drawn without it, more slowly"
+    return Finding("OpenGL", False, text, cure="On Debian or Ubuntu install libgl1 and libegl1.")
 
 
 def _dask() -> Finding:
     if missing := missing_libraries():
-        return Finding(
-            "clusters", False, f"no {', '.join(missing)}: {EXTRA} adds workers on several GPUs or nodes"
-        )
+        text = f"no {', '.join(missing)}: needed for workers on several GPUs or nodes only"
+        return Finding("clusters", False, text, cure=f"{EXTRA} adds them.")
     import distributed
 
     return Finding("clusters", True, f"dask.distributed {distributed.__version__}")
@@ -182,7 +246,13 @@ def _submission(resources: Resources) -> list[Finding]:
     return [Finding("jobs", place is not None, text, needed=True)]
 
 
-def _speed_text(speed: tuple[float, tuple[int, ...]] | None) -> str:
-    if speed is None:
-        return f"{UNKNOWN}; --measure simulates one"
-    return f"{speed[0] / 1.0e6:.3g} million sphere-steps/s a worker, {source_of(speed[1])}"
+def _speed(resources: Resources) -> Finding:
+    """Compare the noted speed of a worker with what is normal."""
+    if not (speed := noted_speed(resources.machine)):
+        return Finding("speed", False, UNKNOWN, cure="--measure simulates one.")
+    low, high = USUAL[resources.on_gpu]
+    text = f"{speed[0] / 1e6:.3g} million sphere-steps/s a worker, {source_of(speed[1])}"
+    normal = f"normal: {low / 1e6:g} to {high / 1e6:,.0f}"
+    good = low <= speed[0] <= high
+    cure = "Other programs may share the cores: close them, then --measure."
+    return Finding("speed", good, f"{text}; {normal}", cure="" if good else cure)

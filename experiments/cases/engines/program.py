@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
 import subprocess
 import sys
@@ -25,6 +24,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
+from dem_warp.processes import cores
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines import run_program
 from experiments.cases.engines.engine import NO_ANSWER
@@ -112,7 +112,7 @@ class ProgramEngine:
                 _RunningPrograms(self, Path(root).resolve(), keeps=checkpoint is not None)
             )
             pool = stack.enter_context(
-                ThreadPoolExecutor(min(workers or self.workers or os.cpu_count() or 1, max(len(cases), 1)))
+                ThreadPoolExecutor(min(workers or self.workers or cores(), max(len(cases), 1)))
             )
             begun = {pool.submit(programs.run, case): index for index, case in enumerate(cases)}
             try:

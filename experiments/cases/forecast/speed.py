@@ -28,6 +28,9 @@ LEAST_SECONDS, LEAST_PART = 0.5, 0.5
 FASTEST = {False: 1.0e9, True: 1.0e12}
 """Sphere-steps a second that no core and no GPU reaches: 30 and 80 times the fastest that was measured."""
 
+LARGE = 1000.0
+"""Spheres of a case from which its speed says something about the machine."""
+
 NEAR_STEP, NEAR_SIZE, LATEST = 1.5, 2.0, 9
 """Ratio of time steps and of spheres up to which a noted batch counts, and how many of the latest do."""
 
@@ -107,11 +110,11 @@ def note_batch(cases: Sequence[Case[Any] | Work], workers: Workers, part: float,
 
 
 def noted_speed(machine: str, like: Load | None = None) -> tuple[float, tuple[int, ...]] | None:
-    """Return the median speed of a worker [sphere-steps/s], in like batches if one is given; number them."""
+    """Return the median speed of a worker [sphere-steps/s], in like batches or in large ones; number them."""
     speeds = {
         number: speed
         for number, (load, speed) in enumerate(noted_batches())
-        if load.machine.startswith(machine) and (load.is_like(like) if like else load.spheres > 1.0)
+        if load.machine.startswith(machine) and (load.is_like(like) if like else load.spheres >= LARGE)
     }
     return (statistics.median([*speeds.values()][-LATEST:]), tuple(speeds)) if speeds else None
 

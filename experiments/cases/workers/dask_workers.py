@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import pickle
 import uuid
 from collections import Counter
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dem_warp import Case, CaseResult
+from dem_warp.processes import cores
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines.engine import Engine
 from experiments.cases.forecast.speed import expected_seconds, note_batch
@@ -103,7 +103,7 @@ class DaskWorkers:
     @property
     def helpers(self) -> int:
         """Cores of the machine of the client."""
-        return os.cpu_count() or 1
+        return cores()
 
     @property
     def leaves_cores(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -15,6 +14,7 @@ from dem_warp import Case, CaseResult, Processes, simulate
 from dem_warp.batch import OnAdvance
 from dem_warp.checkpoint import CHECKPOINT_EVERY
 from dem_warp.device import resolve_device
+from dem_warp.processes import cores
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines.engine import Engine
 from experiments.cases.forecast.speed import expected_seconds, note_batch
@@ -57,7 +57,7 @@ class OwnWorkers:
     @property
     def count(self) -> int:
         """Cases at once on a CPU, 1 on a GPU."""
-        return 1 if self.on_gpu else self.workers or os.cpu_count() or 1
+        return 1 if self.on_gpu else self.workers or cores()
 
     @property
     def sharing(self) -> int:
@@ -72,7 +72,7 @@ class OwnWorkers:
     @property
     def helpers(self) -> int:
         """Processes that may measure at the same time."""
-        return self.workers or os.cpu_count() or 1
+        return self.workers or cores()
 
     @property
     def leaves_cores(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import re
 from collections.abc import Sequence
@@ -12,6 +11,7 @@ import warp as wp
 
 from dem_warp import Case
 from dem_warp.device import resolve_device
+from dem_warp.processes import cores
 from experiments.cases.forecast.work import work_of
 from experiments.cases.workers.batches import GPU_WORKERS, device_bytes, rounds_of
 from experiments.io.errors import InputError
@@ -100,11 +100,11 @@ class Resources:
             return self._in_whole_jobs(asked or self.cluster.workers_per_job, self.cluster.workers_per_job)
         if self.gpus:
             return len(self.gpus) * self.sharing
-        cores = os.cpu_count() or 1
-        if asked and asked > MOST_PER_CORE * cores:
-            problem = f"must be at most {MOST_PER_CORE} processes a core, {MOST_PER_CORE * cores} here"
+        here = cores()
+        if asked and asked > MOST_PER_CORE * here:
+            problem = f"must be at most {MOST_PER_CORE} processes a core, {MOST_PER_CORE * here} here"
             raise InputError(self._place_of_workers, problem, asked)
-        return asked or cores
+        return asked or here
 
     def memory(self, cases: Sequence[Case], most: int) -> float:
         """Predict the memory of this machine, or of each GPU, for at most `most` such cases [bytes]."""

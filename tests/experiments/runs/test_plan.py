@@ -1,8 +1,10 @@
 """Plans of ``--dry-run``, and the findings of ``dem-warp doctor``, before anything runs."""
 
 import json
+import platform
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +12,9 @@ import warp as wp
 from commandline import dem_warp
 
 from experiments import api
+from experiments.cases import Resources
 from experiments.cases.forecast import speed
+from experiments.runs import examination
 from imaging import save_picture
 
 Write = Callable[..., Path]
@@ -125,6 +129,71 @@ def test_the_doctor_tells_what_there_is(monkeypatch: pytest.MonkeyPatch) -> None
     assert not found["speed"]["good"], "nothing like it was noted"
 
 
+@pytest.mark.parametrize(
+    ("driver", "release", "visible", "card", "text", "cure"),
+    [
+        (None, "6.1", None, False, "no NVIDIA GPU: cases run on the CPU", "None is needed. Warp"),
+        (None, "6.1", None, True, "an NVIDIA card without a driver", "Install NVIDIA's driver. Warp"),
+        (None, "5.15-microsoft-standard-WSL2", None, False, "no NVIDIA driver in WSL", "in Windows"),
+        ((12, 4), "6.1", None, True, "the driver of CUDA 12.4 is too old", "needs a driver of CUDA 13.0"),
+        ((13, 1), "6.1", "", True, "CUDA_VISIBLE_DEVICES= hides every GPU", "Unset it."),
+        ((13, 1), "6.1", None, True, "the driver of CUDA 13.1 finds no GPU", "nvidia-smi"),
+    ],
+)
+def test_each_state_without_a_gpu_has_its_cause_and_its_cure(
+    driver: tuple[int, int] | None,
+    release: str,
+    visible: str | None,
+    card: bool,
+    text: str,
+    cure: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name, value in (("vendor", "0x10de\n"), ("class", "0x030200\n")) if card else ():
+        (tmp_path / "one").mkdir(exist_ok=True)
+        (tmp_path / "one" / name).write_text(value, encoding="ascii")
+    monkeypatch.setattr(examination, "DEVICES", tmp_path)
+    monkeypatch.setattr(wp, "get_cuda_driver_version", lambda: driver)
+    monkeypatch.setattr(wp, "get_cuda_toolkit_version", lambda: (13, 4))
+    monkeypatch.setattr(platform, "release", lambda: release)
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    if visible is not None:
+        monkeypatch.setenv("CUDA_VISIBLE_DEVICES", visible)
+    found = examination._no_gpu(75)
+    assert not found.good
+    assert text in found.text
+    assert cure in found.cure
+
+
+def test_a_card_that_is_too_old_for_warp_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    old = SimpleNamespace(name="GTX 1080", alias="cuda:0", arch=61, free_memory=7e9, total_memory=8e9)
+    monkeypatch.setattr(wp, "get_cuda_devices", lambda: [old])
+    monkeypatch.setattr(wp, "get_cuda_supported_archs", lambda: {75, 80, 120})
+    [found] = examination._gpus()
+    assert (found.name, found.good) == ("cuda:0", False)
+    assert "compute capability 6.1" in found.text
+    assert "needs 7.5 or later" in found.cure
+
+
+@pytest.mark.parametrize(("noted", "good"), [(1.0e5, False), (1.0e7, True), (1.0e9, False)])
+def test_a_speed_is_compared_with_what_is_normal(
+    noted: float, good: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(examination, "noted_speed", lambda _: (noted, (0,)))
+    found = examination._speed(Resources("cpu"))
+    assert (found.good, bool(found.cure)) == (good, not good)
+    assert "normal: 2 to 50" in found.text
+
+
+def test_an_error_of_a_check_is_its_finding() -> None:
+    def check() -> list[examination.Finding]:
+        raise PermissionError(13, "Permission denied", "/proc/x")
+
+    [found] = examination._tried("memory", check)
+    assert (found.good, "Permission denied" in found.text) == (False, True)
+
+
 def test_the_doctors_exit_code_tells_that_nothing_can_be_simulated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,3 +202,5 @@ def test_the_doctors_exit_code_tells_that_nothing_can_be_simulated(
     code, out, _ = dem_warp("doctor", "--device", "cpu")
     assert code == 1
     assert "FAIL kernel cache" in out
+    assert "Set WARP_CACHE_PATH" in out
+    assert "ok   simulation" in out, "in a temporary cache"

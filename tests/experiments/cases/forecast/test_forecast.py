@@ -125,7 +125,10 @@ def test_impossible_speeds_are_not_noted_and_one_outlier_counts_little(notes: Pa
     assert forecast([WORK], workers_of())[0] == pytest.approx(10.0)
 
 
-def test_a_damaged_file_and_speeds_of_an_earlier_format_are_ignored(notes: Path) -> None:
+def test_a_damaged_file_and_speeds_of_an_earlier_format_are_ignored(
+    notes: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(speed, "LARGE", 1.0)
     notes.parent.mkdir()
     load = asdict(Load.of([WORK], workers_of()))
     rows: list[Any] = [{"load": load, "speed": 1.0e7}]
@@ -140,6 +143,7 @@ def test_a_damaged_file_and_speeds_of_an_earlier_format_are_ignored(notes: Path)
 
 def test_a_finished_batch_notes_its_speed(small_study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed, "LEAST_SECONDS", 0.0)
+    monkeypatch.setattr(speed, "LARGE", 1.0)
     cases = [small_study.case({}, seed) for seed in (1, 2)]
     workers = OwnWorkers("cpu", 1)
     assert expected_seconds(cases, workers) is None

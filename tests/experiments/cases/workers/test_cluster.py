@@ -193,7 +193,7 @@ def test_more_processes_than_the_cores_serve_are_refused(
 ) -> None:
     from experiments.runs.choices import chosen_resources
 
-    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr("experiments.cases.workers.resources.cores", lambda: 2)
     profile = tmp_path / "many.toml"
     profile.write_text("[cluster]\ngpu = false\nworkers = 17\n", encoding="utf-8")
     assert chosen_resources("cpu", 16).count == 16
