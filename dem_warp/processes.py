@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import logging
-import math
 import multiprocessing
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
 from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
 from typing import Any
@@ -39,37 +37,10 @@ LOSSES = 3
 GUARD = 'if __name__ == "__main__":'
 """Line without which a script cannot start processes: each of them imports the script."""
 
-CGROUP, GROUPS = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
-"""The control group of this process on Linux, and the folder of all of them."""
-
 Report = Callable[[Sequence[float], Sequence[str]], None]
 """Callback with the fraction done and the phase of every case."""
 
 _log = logging.getLogger(__name__)
-
-
-def cores() -> int:
-    """Count the cores that this process may use: by its affinity, and by the quota of its control group."""
-    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min(allowed, math.ceil(min(_quotas(), default=allowed))))
-
-
-def _quotas() -> Iterator[float]:
-    """Yield the cores that the control groups of this process allow, in both versions of Linux's groups."""
-    with suppress(OSError):
-        own = CGROUP.read_text(encoding="ascii").partition("0::/")[2].strip()
-        for folder in (GROUPS / own, *(GROUPS / own).parents):
-            with suppress(OSError, ValueError):
-                yield _share((folder / "cpu.max").read_text(encoding="ascii"))
-    with suppress(OSError, ValueError):
-        files = (GROUPS / f"cpu/cpu.cfs_{name}_us" for name in ("quota", "period"))
-        if (share := _share(" ".join(file.read_text(encoding="ascii") for file in files))) > 0.0:
-            yield share
-
-
-def _share(text: str) -> float:
-    quota, period = text.split()
-    return int(quota) / int(period)
 
 
 class _Process(SpawnProcess):

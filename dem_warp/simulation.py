@@ -10,8 +10,9 @@ from typing import Any
 from dem_warp.batch import OnAdvance, begin
 from dem_warp.case import Case
 from dem_warp.checkpoint import CHECKPOINT_EVERY, Checkpoints
+from dem_warp.cores import cores
 from dem_warp.device import resolve_device
-from dem_warp.processes import REPORT_EVERY, Processes, Report, cores
+from dem_warp.processes import REPORT_EVERY, Processes, Report
 from dem_warp.result import CaseResult, OnProgress, OnResult, Progress
 
 

@@ -25,8 +25,8 @@ from dem_warp import (
     Numerics,
     simulate,
 )
+from dem_warp.cores import cores
 from dem_warp.device import resolve_device
-from dem_warp.processes import cores
 from experiments.cases import Resources, open_workers
 from experiments.cases.forecast.speed import UNKNOWN, noted_speed, source_of
 from experiments.cases.workers.opening import EXTRA, missing_libraries
@@ -58,7 +58,7 @@ class Finding:
     needed: bool = False
     """True if no case can be simulated without it."""
     cure: str = ""
-    """What a person can do where it is not good, or what is normal."""
+    """Advice where it is not good."""
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as JSON-able data."""

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from worlds import SMALL_TUBE, assert_same_result, small_case
 
-from dem_warp import CaseResult, Processes, Progress, processes, simulate
+from dem_warp import CaseResult, Processes, Progress, simulate
 from dem_warp.batch import Batch
 
 CASES = [small_case(seed, replace(SMALL_TUBE, grain_count=4)) for seed in (1, 2, 3)]
@@ -53,31 +53,6 @@ def signed(folder: Path, processes: Processes) -> set[str]:
     folder.mkdir()
     simulate(CASES, "cpu", processes, on_advance=Signature(folder))
     return {path.name for path in folder.iterdir()}
-
-
-@pytest.mark.parametrize(
-    ("files", "allowed"),
-    [
-        ({}, 8),
-        ({"cpu.max": "max 100000"}, 8),
-        ({"job/cpu.max": "150000 100000"}, 2),
-        ({"job/cpu.max": "max 100000", "cpu.max": "300000 100000"}, 3),
-        ({"job/cpu.max": "10000 100000"}, 1),
-        ({"cpu/cpu.cfs_quota_us": "400000", "cpu/cpu.cfs_period_us": "100000"}, 4),
-        ({"cpu/cpu.cfs_quota_us": "-1", "cpu/cpu.cfs_period_us": "100000"}, 8),
-    ],
-)
-def test_cores_are_those_of_the_affinity_and_the_control_group(
-    files: dict[str, str], allowed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name, text in files.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(f"{text}\n", encoding="ascii")
-    (tmp_path / "own").write_text("0::/job\n", encoding="ascii")
-    monkeypatch.setattr(processes, "CGROUP", tmp_path / "own")
-    monkeypatch.setattr(processes, "GROUPS", tmp_path)
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(8)))
-    assert processes.cores() == allowed
 
 
 def test_processes_stay_from_call_to_call_with_the_same_bits_and_end_with_their_block(

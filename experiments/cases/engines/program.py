@@ -24,7 +24,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
-from dem_warp.processes import cores
+from dem_warp.cores import cores
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines import run_program
 from experiments.cases.engines.engine import NO_ANSWER

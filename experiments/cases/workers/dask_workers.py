@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dem_warp import Case, CaseResult
-from dem_warp.processes import cores
+from dem_warp.cores import cores
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines.engine import Engine
 from experiments.cases.forecast.speed import expected_seconds, note_batch

@@ -13,8 +13,8 @@ import warp as wp
 from dem_warp import Case, CaseResult, Processes, simulate
 from dem_warp.batch import OnAdvance
 from dem_warp.checkpoint import CHECKPOINT_EVERY
+from dem_warp.cores import cores
 from dem_warp.device import resolve_device
-from dem_warp.processes import cores
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engines.engine import Engine
 from experiments.cases.forecast.speed import expected_seconds, note_batch

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import warp as wp
 
 from dem_warp import Case
+from dem_warp.cores import cores
 from dem_warp.device import resolve_device
-from dem_warp.processes import cores
 from experiments.cases.forecast.work import work_of
 from experiments.cases.workers.batches import GPU_WORKERS, device_bytes, rounds_of
 from experiments.io.errors import InputError
