@@ -19,7 +19,7 @@ from dem_warp import SCENES
 from experiments.cli import app
 from experiments.discover.mechanism_files import FILES
 from experiments.studyfile.observables import OBSERVABLES, OUTLINE
-from experiments.studyfile.reference import study_reference
+from experiments.studyfile.reference import Row, study_reference
 
 
 def escaped(text: str) -> str:
@@ -39,8 +39,8 @@ def study_page() -> str:
     """Every section and key of a study file."""
     parts = [
         "# The study file",
-        "Every section and every key, as the program checks them. Write a quantity with its unit, "
-        '`"110 mm"`. A misspelt key is an error.',
+        "Every section and every key, as the program checks them, and what holds where a key is left out. "
+        'Write a quantity with its unit, `"110 mm"`. A misspelt key is an error.',
     ]
     for section, found in groupby(study_reference(), lambda row: row.section):
         rows = list(found)
@@ -48,13 +48,16 @@ def study_page() -> str:
         parts.append(f"## `{section}`" if section else "## At the top")
         parts += [about] if about else []
         keys = [
-            (f"`{row.key}`", row.kind, f"`{row.default}`" if row.default else "", row.bounds, row.meaning)
-            for row in rows
-            if row.key
+            (f"`{row.key}`", row.kind, _left_out(row), row.bounds, row.meaning) for row in rows if row.key
         ]
         if keys:
             parts.append(markdown_table(("key", "written as", "left out", "rule", "meaning"), keys))
     return "\n\n".join(parts)
+
+
+def _left_out(row: Row) -> str:
+    """Say what holds where a key is left out: its default, or an error."""
+    return "*required*" if row.required else f"`{row.default}`" if row.default else ""
 
 
 def commands_page() -> str:
