@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -52,6 +53,8 @@ class MeasuredHeap:
     """Format of the file, and the measured part of it."""
     spheres: Spheres
     """Spheres [m] on the plate z = 0."""
+    doubts: tuple[Doubt, ...] = ()
+    """Doubts about the given plate."""
 
     def pictures(self) -> tuple[Picture, Picture]:
         """Draw the heap with the fitted flanks of its first view, and without."""
@@ -131,7 +134,16 @@ def _measured(
         parts.append("height seems to be along y, and is read so")
     if fallen := int(np.count_nonzero(~standing)):
         parts.append(f"{fallen} below it left out")
-    return MeasuredHeap(angle, "; ".join((*parts, *notes)), heap)
+    doubts = _doubted_plate(spheres, height)
+    return MeasuredHeap(angle, "; ".join((*parts, *notes)), heap, tuple(doubts))
+
+
+def _doubted_plate(spheres: Spheres, height: float) -> Iterator[Doubt]:
+    """Doubt a plate where other spheres of a file seem to rest."""
+    with suppress(PictureError):
+        found = find_ground(spheres)
+        if abs(found - height) > BELOW * np.median(spheres.radii):
+            yield Doubt("plate", f"given at {1e3 * height:.4g} mm; most spheres rest at {1e3 * found:.4g} mm")
 
 
 def _span(radii: np.ndarray) -> str:
@@ -142,7 +154,7 @@ def _span(radii: np.ndarray) -> str:
 def values_of(heap: MeasuredHeap, level: float) -> dict[str, Any]:
     """Return the values of a heap's row, without those of a camera; flanks are means over its views."""
     left, right = (float(np.mean([getattr(view, side) for view in heap.angle.views])) for side in SIDES)
-    values = mean_values(heap.angle, left, right, level, _doubts(heap.angle))
+    values = mean_values(heap.angle, left, right, level, (*heap.doubts, *_doubts(heap.angle)))
     return values | {"source": heap.source}
 
 

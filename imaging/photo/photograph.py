@@ -17,6 +17,13 @@ from imaging.flank.flank_line import fit_flanks
 from imaging.flank.outline import Doubt, Outline, levelled
 from imaging.flank.plate_line import PlateLine
 from imaging.geometry import FloatArray, Picture
+from imaging.photo.around_foot import (
+    NARROW_BASE,
+    FoundHeap,
+    darker_below,
+    refuse_narrow_base,
+    without_strays,
+)
 from imaging.photo.background import Contrast, contrast_with_background
 from imaging.photo.contrast_variants import (
     with_filled_gaps,
@@ -32,13 +39,7 @@ from imaging.photo.doubts import (
     doubts_of,
     relative_misfit,
 )
-from imaging.photo.heap_on_plate import (
-    FoundHeap,
-    darker_below,
-    locate_heap,
-    refuse_narrow_base,
-    without_strays,
-)
+from imaging.photo.heap_on_plate import locate_heap
 from imaging.photo.view_settings import View
 from imaging.photo.wall_shadow import (
     MOST_SHADED,
@@ -164,10 +165,14 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
         width = int(np.isfinite(best.heap.rows).sum())
         if lit := _without_sharp_shadow(seen, width, given, view, place):
             best, finding, doubted = lit, "", []
-    if given is None:
-        refuse_narrow_base(seen, best.heap, best.ends, place)
     doubts = list(best.heap.doubts)
-    if given is None and darker_below(seen, best.heap, best.ends):
+    try:
+        refuse_narrow_base(seen, best.heap, best.ends, place)
+    except PictureError:
+        if given is None:
+            raise
+        doubts.append(Doubt("plate", NARROW_BASE))
+    if darker_below(seen, best.heap, best.ends):
         doubts.append(Doubt("shade", "it is darker below the heap than on both sides: a shadow, or a dish?"))
     doubts += doubted
     if best.clear and finding:

@@ -34,19 +34,19 @@ def test_a_level_camera_at_an_unknown_distance_changes_no_bit() -> None:
     assert 0.3 < level_error(29.0, 10.0, 0.0, None) < 1.0
 
 
-def raised(angle: float, elevation: float, far_edge: float = 0.25, noise_seed: int = 0) -> np.ndarray:
+def raised(angle: float, elevation: float, far_edge: float = 0.25, plate: tuple = PLATE) -> np.ndarray:
     """Draw a smooth cone from afar, above a plate whose far edge lies behind its foot."""
     fine, half, turn = 4, 260.0, np.radians(elevation)
     image = np.full((fine * 480, fine * 840, 3), WALL, np.uint8)
     middle, foot = fine * 420.0, fine * 330.0
-    image[int(foot - fine * far_edge * half) :] = PLATE
+    image[int(foot - fine * far_edge * half) :] = plate
     around = np.linspace(0.0, 2.0 * np.pi, 721)
     base = np.column_stack([half * np.cos(around), half * np.sin(turn) * np.sin(around)])
     tip = [[0.0, -half * np.tan(np.radians(angle)) * np.cos(turn)]]
     hull = cv2.convexHull(np.rint(fine * np.vstack([base, tip]) + [middle, foot]).astype(np.int32))
     cv2.fillPoly(image, [hull], GRAIN)
     small = cv2.resize(image, (840, 480), interpolation=cv2.INTER_AREA).astype(float)
-    noise = np.random.default_rng(noise_seed).normal(0.0, 4.0, small.shape)
+    noise = np.random.default_rng(0).normal(0.0, 4.0, small.shape)
     return np.clip(small + noise, 0, 255).astype(np.uint8)
 
 
@@ -134,6 +134,48 @@ def test_a_given_plate_is_taken() -> None:
     given = measure(picture, view=View(plate=points))
     assert given.outline.plate.tilt == pytest.approx(plate.tilt, abs=1e-6)
     assert given.mean == pytest.approx(28.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("elevation", "angle"), [(0.0, 30.0), (4.0, 25.0), (10.0, 34.0), (14.0, 34.0)])
+@pytest.mark.parametrize("plate", [PLATE, WALL])
+def test_a_given_plate_leaves_the_cameras_height_measured(
+    elevation: float, angle: float, plate: tuple
+) -> None:
+    turn = np.radians(elevation)
+    touch = 260.0 * np.sin(turn) ** 2 / (np.tan(np.radians(angle)) * np.cos(turn))
+    line = (160.0, 330.0 - touch, 680.0, 330.0 - touch)  # where the outline's flanks touch the base
+    measured = measure(raised(angle, elevation, plate=plate), view=View(distance=np.inf, plate=line))
+    # the limits of the same heaps without a given plate
+    assert measured.outline.elevation == pytest.approx(elevation, abs=0.6)
+    assert measured.mean == pytest.approx(angle, abs=0.4)
+    assert [doubt.name for doubt in measured.doubts] == ["elevation"] * (elevation > 12.0)
+
+
+def test_a_given_plate_whose_foot_is_not_visible_is_doubted_for_the_cameras_height() -> None:
+    line, picture = (160.0, 330.0, 680.0, 330.0), raised(34.0, 6.0, 0.0, GRAIN)
+    [doubt] = measure(picture, view=View(plate=line)).doubts
+    assert (doubt.name, "not visible" in doubt.finding) == ("elevation", True)
+    assert measure(picture, view=View(plate=line, elevation=6.0)).doubts == ()
+
+
+def test_a_dish_below_a_given_plate_is_doubted() -> None:
+    picture = np.full((420, 700, 3), WALL, np.uint8)
+    cv2.fillPoly(picture, [np.array([[150, 250], [350, 150], [550, 250]])], GRAIN, cv2.LINE_AA)
+    cv2.rectangle(picture, (150, 250), (550, 330), (160, 90, 60), -1)
+    measured = measure(picture, view=View(plate=(150.0, 250.0, 550.0, 250.0)))
+    assert any("plate wider than itself" in str(doubt) for doubt in measured.doubts)
+
+
+def test_a_given_height_of_the_camera_replaces_the_measured_one() -> None:
+    """Also where the measured one would have refused the picture."""
+    for elevation, angle in ((2.0, 25.0), (14.0, 34.0), (22.0, 34.0)):
+        view = View(distance=np.inf, elevation=elevation)
+        assert measure(raised(angle, elevation), view=view).mean == pytest.approx(angle, abs=0.3)
+    with pytest.raises(PictureError, match="from the side"):
+        measure(raised(44.0, 38.0))
+    assert "elevation" in [
+        each.name for each in measure(raised(44.0, 38.0), view=View(elevation=38.0)).doubts
+    ]
 
 
 def test_a_heap_in_a_dish_is_refused() -> None:
