@@ -38,6 +38,9 @@ from experiments.studyfile.manifest import MANIFEST, write_manifest
 WALL_TIMES_FILE = "wall_times.csv"
 """File of the wall times of a folder's batches, over all its runs."""
 
+SAVE_WALL_TIME = 5.0
+"""Time between two notes of the wall time of a batch [s]: a run that is killed loses no more."""
+
 OUTCOMES, BANK = "outcomes.sqlite", "bank.npz"
 """Files that the searches of a folder share: the numbers of the cases, the bank."""
 
@@ -64,14 +67,25 @@ class Run:
     def batch(self, title: str, kept: Callable[[], int]) -> Iterator[OnProgress]:
         """Show a batch of cases and note it in the journal; the block's value takes its progress.
 
-        `kept` counts the cases that are kept: if some are added, the wall time of the batch is noted.
+        `kept` counts the cases that are kept: if some are added, the wall time of the batch is saved; that of
+        a batch that is killed is saved on the way.
         """
         before, started, last = kept(), time.perf_counter(), 0.0
+        earlier, saved = self.wall_times, 0.0
+
+        def save(seconds: float) -> None:
+            row = {"stage": title, "simulated": kept() - before, "seconds": round(seconds, 1)}
+            rows = pd.DataFrame([*earlier, row])
+            write_text(self.folder / WALL_TIMES_FILE, rows.to_csv(index=False))
+
         with self.watch(title) as shown, self.journal.batch(title) as noted:
 
             def report(progress: Progress) -> None:
-                nonlocal last
+                nonlocal last, saved
                 last = time.perf_counter() - started
+                if last >= saved + SAVE_WALL_TIME:
+                    saved = last
+                    save(last)
                 noted(progress)
                 if shown is not None:
                     shown(progress)
@@ -81,14 +95,8 @@ class Run:
         if not (self.folder / MANIFEST).exists():
             # someone removed the folder meanwhile: a later run can continue from what comes now
             write_manifest(self.folder, self.study)
-        if simulated := kept() - before:
-            row = {
-                "stage": title,
-                "simulated": simulated,
-                "seconds": round(time.perf_counter() - started, 1),
-            }
-            noted_rows = pd.DataFrame([*self.wall_times, row])
-            write_text(self.folder / WALL_TIMES_FILE, noted_rows.to_csv(index=False))
+        if saved or kept() > before:
+            save(time.perf_counter() - started)
 
     def run_cases(self, table: pd.DataFrame, title: str) -> pd.DataFrame:
         """Simulate the cases of a table that are not stored yet, as one batch, and measure all of them."""

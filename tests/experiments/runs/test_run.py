@@ -4,8 +4,10 @@ import json
 import math
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ import pandas as pd
 import pytest
 from cone_engine import stand_in
 
-from dem_warp import Case, CaseResult
+from dem_warp import Case, CaseResult, Progress
 from doe.discrepancy import Outcomes, bank_points, make_bank
 from experiments import api
 from experiments.calibrate import Campaign, Outcome
@@ -200,3 +202,30 @@ def test_a_bank_that_a_person_brought_is_left_alone(study: Study, tmp_path: Path
     run_campaign(study, tmp_path / "out", resume=True)
     assert (tmp_path / "out" / run_folder.BANK).is_file()
     assert run_folder.BANK not in listed(tmp_path / "out")
+
+
+def test_a_run_that_was_killed_and_resumed_has_the_wall_time_of_all_its_parts(
+    small_study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_folder, "SAVE_WALL_TIME", 0.0)
+    clock = iter([0.0, 60.0, 0.0, 7.0, 9.0])
+    monkeypatch.setattr(run_folder.time, "perf_counter", lambda: next(clock))
+    journal: Any = SimpleNamespace(batch=lambda _: nullcontext(lambda _: None))
+    cases: list[int] = []
+
+    def part(killed: bool) -> None:
+        nothing: Any = None
+        folder = run_folder.Run(small_study, tmp_path, nothing, nothing, journal, lambda _: nullcontext())
+        with folder.batch("climb", lambda: len(cases)) as report:
+            report(Progress(0, 1, 0.5, {}, 60.0))
+            if killed:
+                raise KeyboardInterrupt
+            cases.append(1)
+
+    with pytest.raises(KeyboardInterrupt):
+        part(killed=True)
+    part(killed=False)
+    rows = pd.read_csv(tmp_path / run_folder.WALL_TIMES_FILE)
+    assert rows["stage"].tolist() == ["climb", "climb"]
+    assert rows["simulated"].tolist() == [0, 1]
+    assert rows["seconds"].tolist() == [60.0, 9.0]
