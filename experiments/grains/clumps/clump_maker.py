@@ -11,9 +11,10 @@ import numpy as np
 
 from dem_warp import ClumpShape
 from dem_warp.clump_fitting import ClumpFit, fit_clump
-from dem_warp.solids import parse_solid, read_mesh
+from dem_warp.solids import parse_solid
 from experiments.grains.clumps.clump_picture import draw_clump
 from experiments.grains.clumps.clump_search import Trial, fit_by_volume, fit_within
+from experiments.grains.clumps.mesh_file import read_surface
 from experiments.grains.spheres import format_of, length_unit, read_clump
 from experiments.grains.spheres.clump_file import GRAIN_SIZES, check_grain_size, unit_option
 from experiments.io.errors import InputError
@@ -155,7 +156,7 @@ def _holds_spheres(path: Path, to_fit: bool) -> bool:
 def _mesh(path: Path, unit: str | None) -> Trimesh:
     """Read one closed body of a grain's size."""
     try:
-        mesh = read_mesh(path, length_unit(unit or "mm"))
+        mesh = read_surface(path, length_unit(unit or "mm"))
     except ValueError as error:
         if error.__cause__ is None:
             raise

@@ -186,7 +186,7 @@ HOSTILE = {
     "an open mesh": clump(
         "solid o\nfacet normal 0 0 1\nouter loop\n"
         "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
-        "endsolid o\n", "g.stl", "closed", "open or doubled", options="--spheres 3", name="g.stl",
+        "endsolid o\n", "g.stl", "surface is open", "3 open edges", options="--spheres 3", name="g.stl",
     ),
     "a mesh without heights": clump(
         PLY.replace("binary_little_endian", "ascii") + "end_header\n0\n",
