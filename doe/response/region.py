@@ -1,7 +1,7 @@
 """Regions of a surface: the settings that a measured target does not contradict."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,12 @@ CELLS_MOST = 20_000_000
 
 CELLS_PER_FACTOR = 2_000
 """Largest number of cells along one factor."""
+
+NEAR_EDGE = 2
+"""Cells from the edge of what was explored at which a region ends there: the edge is a staircase of cells."""
+
+EDGE_SHARE = 0.25
+"""Share of a range's last cells near that edge from which on it ends there; a straight band has less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +106,23 @@ class Region:
         edges = pd.DataFrame({"low": belonging.min() - half_cell, "high": belonging.max() + half_cell}).T
         return natural_points(self.factors, edges).T.rename_axis("factor")
 
+    @property
+    def open_ends(self) -> pd.DataFrame:
+        """True for each low and high end of ``ranges`` at the edge of what was tested: it may go on there."""
+        shape = (self.resolution,) * len(self.factors)
+        explored = np.ones_like(self.mask) if self.explored is None else self.explored
+        ends = {}
+        for axis, factor in enumerate(self.factors):
+            inside, seen = (np.moveaxis(cells.reshape(shape), axis, 0) for cells in (self.mask, explored))
+            seen = np.pad(seen.reshape(self.resolution, -1), ((NEAR_EDGE, NEAR_EDGE), (0, 0)))
+            inside = inside.reshape(self.resolution, -1)
+            layers = np.flatnonzero(inside.any(axis=1))[[0, -1]] if inside.any() else ()
+            ends[factor.name] = [
+                bool(np.mean(~seen[layer + shift, inside[layer]]) >= EDGE_SHARE)
+                for layer, shift in zip(layers, (0, 2 * NEAR_EDGE), strict=False)
+            ] or [False, False]
+        return pd.DataFrame.from_dict(ends, orient="index", columns=["low", "high"]).rename_axis("factor")
+
 
 def compatible_region(
     surface: FittedSurface,
@@ -109,6 +132,7 @@ def compatible_region(
     alpha: float = 0.05,
     extent: float = 1.0,
     resolution: int | None = None,
+    radius: float | None = None,
 ) -> Region:
     """Return the settings whose fitted mean and the measured target do not differ significantly.
 
@@ -128,14 +152,18 @@ def compatible_region(
         Coded half width of the box.
     resolution : int, optional
         Cells along each factor.
+    radius : float, optional
+        Coded distance from the centre beyond which nothing is tested, e.g. that of the farthest run.
 
-    Raises DesignError: a target, an error, a level or an extent out of its range.
+    Raises DesignError: a target, an error, a level, an extent or a radius out of its range.
     """
     goal = _goal(target, target_se, target_df)
     points, count = box_cells(len(surface.design.factors), extent, resolution)
     difference, error, share, errors = misfit(surface, points, *goal)
-    mask = np.abs(difference) <= errors.critical(share, alpha) * error
-    return _region(surface, points, mask, count, extent)
+    reach = np.inf if radius is None else checked_number("radius", radius, above=0.0)
+    explored = np.linalg.norm(points, axis=1) <= reach
+    mask = explored & (np.abs(difference) <= errors.critical(share, alpha) * error)
+    return replace(_region(surface, points, mask, count, extent), explored=explored)
 
 
 def agrees(surface: FittedSurface, coded: ArrayLike, target: Sample, alpha: float = 0.05) -> bool:

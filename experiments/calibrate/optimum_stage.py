@@ -43,16 +43,21 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     response = study.target.leading
     goals = {name: Goal(found.reduced, target.responses[name]) for name, found in surface.responses.items()}
     joint = joint_fit(goals, alpha=1.0 - settings.confidence) if len(goals) > 1 else None
+    alpha, radius = 1.0 - settings.confidence, _radius(surface)
     if joint is None:
         # The box of the two-level part first: inside it the fit is at its best. Axial points reach further.
-        point, rule, extent = _choose(study, surface, sample, sorted({1.0, reach}))
-        region = fit.compatible_region(sample, alpha=1.0 - settings.confidence, extent=extent)
+        point, rule = _choose(study, surface, sample, sorted({1.0, reach}))
+        region = fit.compatible_region(sample, alpha=alpha, extent=reach, radius=radius)
     else:
-        (point, rule), extent, region = choose_jointly(joint, settings), joint.extent, joint.region()
+        (point, rule), region = choose_jointly(joint, settings), joint.region()
     prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
     likely = (prediction["confidence_low"], prediction["confidence_high"])
     unidentified = _unidentified(settings, region)
-    truth = None if target.truth is None else _check_truth(fit, target, settings.confidence, reach, joint)
+    truth = (
+        None
+        if target.truth is None
+        else _check_truth(fit, target, settings.confidence, (reach, radius), joint)
+    )
     numbers = numbered_values("chosen", point)
     numbers |= {key_of("prediction", response): prediction["mean"]}
     numbers |= {key_of("se of the fit", response): prediction["se"]}
@@ -74,8 +79,8 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
         point=point,
         settings=middle(study.factors, point),
         prediction=prediction,
-        extent=extent,
-        contour=fit.contour(sample.mean, extent),
+        extent=region.extent,
+        contour=fit.contour(sample.mean, region.extent),
         region=region,
         unidentified=unidentified,
         truth=truth,
@@ -86,14 +91,14 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
 
 def _choose(
     study: Study, surface: SurfaceResult, target: Sample, extents: list[float]
-) -> tuple[dict[str, float], str, float]:
-    """Return the chosen point, the rule that chose it, and the extent that holds it."""
+) -> tuple[dict[str, float], str]:
+    """Return the chosen point, and the rule that chose it."""
     fit = surface.leading.reduced
     fixed = fixed_values(study.campaign.optimum.point, surface.center)
     if fixed is not None:
-        return fixed, "The study fixes the chosen point.", extents[-1] if _reach(fit, fixed) > 1.0 else 1.0
+        return fixed, "The study fixes the chosen point."
     rule = "The chosen point is the one of the target contour nearest to the design's centre, in coded units."
-    radius = float(np.linalg.norm(surface.design.points.to_numpy(), axis=1).max())
+    radius = _radius(surface)
     for extent in extents:
         try:
             point = {
@@ -102,8 +107,8 @@ def _choose(
         except TargetError as error:
             missed = str(error)
             continue
-        if np.linalg.norm(_coded(fit, point)) <= radius * (1.0 + 1e-9):
-            return point, rule, extent
+        if np.linalg.norm(_coded(fit, point)) <= radius:
+            return point, rule
         missed = f"the target contour lies beyond the design's runs, nearest at {worded(study, point)}"
     alpha = 1.0 - study.campaign.optimum.confidence
     if closest := _closest(fit, target, extents[-1], radius, alpha):
@@ -111,7 +116,7 @@ def _choose(
             "No point of the design's region gives the target: the chosen one comes closest, by no more than "
             "the errors of fit and target together explain."
         )
-        return closest, rule, extents[-1]
+        return closest, rule
     raise StageEnd(
         Outcome.NO_CONTOUR,
         f"No point of the composite design's region gives the target: {missed}. Fix surface.center nearer to "
@@ -119,13 +124,18 @@ def _choose(
     )
 
 
+def _radius(surface: SurfaceResult) -> float:
+    """Return the coded distance of the farthest run from the centre: that run itself is inside."""
+    return float(np.linalg.norm(surface.design.points.to_numpy(), axis=1).max()) * (1.0 + 1e-9)
+
+
 def _closest(
     fit: Surface, target: Sample, extent: float, radius: float, alpha: float
 ) -> dict[str, float] | None:
     """Return the compatible point among the runs whose fit is closest to the target, None where none is."""
-    region = fit.compatible_region(target, alpha=alpha, extent=extent)
+    region = fit.compatible_region(target, alpha=alpha, extent=extent, radius=radius)
     distance = np.linalg.norm(region.coded.to_numpy(), axis=1)
-    cells = np.flatnonzero(region.mask & (distance <= radius))
+    cells = np.flatnonzero(region.mask)
     if not len(cells):
         return None
     gap = np.abs(fit.evaluate(region.coded.iloc[cells].to_numpy())[0] - target.mean)
@@ -154,7 +164,7 @@ def _unidentified(settings: OptimumSettings, region: Region) -> tuple[str, ...]:
 
 
 def _check_truth(
-    fit: Surface, target: TargetResult, confidence: float, reach: float, joint: JointFit | None
+    fit: Surface, target: TargetResult, confidence: float, reach: tuple[float, float], joint: JointFit | None
 ) -> TruthCheck:
     """Say where the hidden settings lie; factors that were not kept are at their middle in the fit."""
     truth, sample = target.truth or {}, target.leading
@@ -162,10 +172,10 @@ def _check_truth(
     coded, far = _coded(fit, values), _reach(fit, values)
     distance = None
     with suppress(TargetError):  # a point fixed in the study needs no contour
-        nearest = fit.nearest(sample.mean, to=values, extent=max(reach, far))
+        nearest = fit.nearest(sample.mean, to=values, extent=max(reach[0], far))
         distance = float(np.linalg.norm(_coded(fit, dict(nearest)) - coded))
     predicted = fit.predict(values).iloc[0]
-    inside = far <= reach
+    inside = far <= reach[0] and float(np.linalg.norm(coded)) <= reach[1]
     agrees = joint.agrees(values) if joint else fit.agrees(values, sample, 1.0 - confidence)
     compatible = agrees if inside else None
     return TruthCheck(values, inside, compatible, distance, float(predicted["mean"]))

@@ -283,7 +283,10 @@ class OptimumResult(StageResult):
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the contour, the compatible range of each factor and the joint fit."""
-        tables = {"contour": self.contour, "compatible_ranges": self.region.ranges}
+        tables = {
+            "contour": self.contour,
+            "compatible_ranges": self.region.ranges.join(self.region.open_ends.add_suffix("_open")),
+        }
         if self.joint is not None:
             tables["joint_responses"] = self.joint.tests(self.point)
             tables["joint_shrinkage"] = self.joint.shrinkage

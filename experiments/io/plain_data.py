@@ -25,7 +25,7 @@ _PROPERTIES: dict[str, tuple[str, ...]] = {
         "anova", "coefficients", "coded_coefficients", "dropped", "r2", "r2_adjusted", "r2_predicted",
         "cv_percent", "adequate_precision",
     ),
-    "Region": ("fraction", "ranges", "extent", "resolution"),
+    "Region": ("fraction", "ranges", "open_ends", "extent", "resolution"),
     "JointFit": ("point", "alpha", "extent", "shrinkage", "directions"),
 }  # fmt: skip
 """Properties of each result of `doe` that results.json has, by class: naming a class loads statsmodels."""

@@ -11,7 +11,14 @@ from experiments.bridge.result import Crossing
 from experiments.io.files import copy_file, write_text
 from experiments.io.texts import safe_text
 from experiments.io.toml_files import toml_text
-from experiments.report.material_card import CARD, compatible_points, quantity_text, sample_table, short
+from experiments.report.material_card import (
+    CARD,
+    compatible_points,
+    open_ends,
+    quantity_text,
+    sample_table,
+    short,
+)
 from experiments.studyfile.card import BRIDGE, MATERIAL, SECTIONS, files_of
 from experiments.studyfile.factor_section import with_factor_values
 
@@ -53,6 +60,7 @@ def corrected_card(crossing: Crossing) -> dict[str, Any]:
         card["compatible"] = compatible_points(region)
         for name, ends in region.ranges.iterrows() if region.mask.any() else ():
             card["factor"][name] |= {end: short(ends[end]) for end in ("low", "high")}
+            card["factor"][name]["not_explored_beyond"] = open_ends(region, str(name))
     card[BRIDGE] = _bridge(crossing)
     return card
 

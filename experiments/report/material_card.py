@@ -32,6 +32,7 @@ HEAD = """\
 # Material card, written by dem-warp calibrate. A study takes its values by  material = "{card}"
 # They hold together with the contact laws [material.solver], the clump and the estimator that they were found
 # with. Every point of [compatible] is as good as the chosen one; not so every combination of the ranges.
+# A range goes on, perhaps, at an end that not_explored_beyond names: the study explored nothing there.
 
 """
 
@@ -116,6 +117,7 @@ def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
             "chosen": short(optimum.point[factor.name]),
             "low": short(region.ranges["low"][factor.name]) if found else None,
             "high": short(region.ranges["high"][factor.name]) if found else None,
+            "not_explored_beyond": open_ends(region, factor.name),
             "identified": factor.name not in optimum.unidentified,
         }
         for factor in region.factors
@@ -126,6 +128,11 @@ def _surfaces(campaign: Campaign) -> dict[str, Any]:
     if campaign.surface is None:
         return {}
     return {name: surface_table(found.reduced) for name, found in campaign.surface.responses.items()}
+
+
+def open_ends(region: Region, name: str) -> list[str]:
+    """Name the ends of a factor's range ("low", "high") beyond which nothing was explored."""
+    return [str(end) for end, opened in region.open_ends.loc[name].items() if opened]
 
 
 def compatible_points(region: Region) -> dict[str, Any]:

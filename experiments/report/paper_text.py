@@ -9,11 +9,12 @@ from typing import Any
 import pandas as pd
 
 from dem_warp import EDEM
+from doe import Region
 from experiments.calibrate.results import Campaign
 from experiments.io.program_version import program_version
 from experiments.report.kit.latex import latex_table, latex_text
 from experiments.report.kit.markdown import markdown_table
-from experiments.report.kit.numbers import enumeration, fixed, p_clause, quantity, significant
+from experiments.report.kit.numbers import enumeration, fixed, open_end, p_clause, quantity, significant
 from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Layout, Table, columns, make_table
 from experiments.report.study_facts import study_facts
@@ -72,8 +73,8 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
         raise ValueError("a campaign that chose no point has no values")
     rows = []
     for factor in study.factors:
-        calibrated, ranges = factor.name in optimum.point, optimum.region.ranges
-        ends = [significant(float(ranges[end].get(factor.name, float("nan"))), 3) for end in ("low", "high")]
+        calibrated, region = factor.name in optimum.point, optimum.region
+        ends = _ends(region, factor.name) if calibrated else []
         rows.append(
             {
                 "parameter": study.labels[factor.name],
@@ -81,7 +82,7 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
                 "unit": factor.unit or "1",
                 "explored": f"{factor.low:g} to {factor.high:g}",
                 "value": significant(optimum.settings[factor.name], 3),
-                "compatible": " to ".join(ends) if calibrated else "not calibrated",
+                "compatible": " to ".join(ends) if ends else "not calibrated",
             }
         )
     shown: Layout = [
@@ -91,6 +92,13 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
     level = fixed(100.0 * campaign.settings.optimum.confidence, 0)
     caption, note = "Contact parameters, as calibrated.", say("note.paper", level=level)
     return make_table("paper", pd.DataFrame(rows), shown, caption, note)
+
+
+def _ends(region: Region, name: str) -> list[str]:
+    """Write both ends of a factor's compatible range; those beyond which nothing was explored say so."""
+    values, opened = region.ranges.loc[name], region.open_ends.loc[name]
+    forms = {end: open_end(end) if opened[end] else "{}" for end in ("low", "high")}
+    return [form.format(significant(float(values[end]), 3)) for end, form in forms.items()]
 
 
 def simulated_sentences(study: Study) -> Iterator[str]:

@@ -18,7 +18,7 @@ from experiments.calibrate.results import (
     SurfaceResult,
     failed,
 )
-from experiments.report.kit.numbers import unit_sign
+from experiments.report.kit.numbers import open_end, unit_sign
 from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.studyfile.campaign import TARGET_SCENE, Response
@@ -225,12 +225,16 @@ def values_table(campaign: Campaign, optimum: OptimumResult, labels: Mapping[str
             "how": {name: _how(name, optimum) for name in optimum.settings},
         }
     ).rename_axis("factor")
+    for end, opened in region.open_ends.items():
+        frame[f"{end} around"] = opened.map({True: open_end(str(end)), False: "{}"})
+        frame[f"{end} around"] = frame[f"{end} around"].fillna("{}")
     frame = frame.loc[[*chosen, *(name for name in optimum.settings if name not in chosen)]]
     shown: Layout = [
         *columns(label="parameter", factor="symbol"),
         Column("value", "value", "level"),
         "unit",
-        *columns("free", low="as good from", high="to"),
+        Column("low", "as good from", "free", around="low around"),
+        Column("high", "to", "free", around="high around"),
         Column("how", "how it was found"),
     ]
     marks = ["chosen" if name in chosen else "" for name in frame.index]

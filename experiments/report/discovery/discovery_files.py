@@ -47,4 +47,8 @@ def write_discovery(
 def results_of(found: Discovery, terms: Terms) -> dict[str, Any]:
     """Everything that was found as JSON-able data, with the verdict in words."""
     words = {"headline": headline(found, terms), "sentence": verdict_sentence(found, terms)}
-    return {**words, "discovery": jsonable(found)}
+    sizes = [pair for one in found.candidates for pair in zip(one.mechanisms, one.sizes, strict=True)]
+    ends = sorted({name for name, size in sizes if terms.at_maximum(name, size)})
+    return {**words, "not_explored_beyond": {name: terms.mechanisms[name].maximum for name in ends}} | {
+        "discovery": jsonable(found)
+    }

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from doe.discrepancy import Interval
-from experiments.report.kit.numbers import MISSING, enumeration, fixed, trimmed
+from experiments.report.kit.numbers import MISSING, enumeration, fixed, open_end, trimmed
 from experiments.studyfile.factor_section import FactorSection
 from experiments.studyfile.mechanism_factor import MechanismFactor
 from experiments.studyfile.observables import Observable
@@ -21,6 +21,10 @@ GAP = "\u00a0"
 
 SIZE_DIGITS = 3
 """Significant digits of the size of a mechanism."""
+
+
+AT_MAXIMUM = 1e-6
+"""Distance from the largest size below which an interval ends there, as a share: rounding of its coding."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +70,12 @@ class Terms:
 
     def size(self, name: str, size: Interval) -> str:
         """Write the size of a mechanism with its 90 % interval."""
-        low, high = (trimmed(end, SIZE_DIGITS) for end in (size.low, size.high))
+        low, high = self._ends(name, size)
         return f"{self.value(name, size.value)} (90 % interval {low} to {high})"
 
     def short_size(self, name: str, size: Interval) -> str:
         """Write a size for a table: value, interval, unit."""
-        low, high = (trimmed(end, SIZE_DIGITS) for end in (size.low, size.high))
+        low, high = self._ends(name, size)
         return f"{trimmed(size.value, SIZE_DIGITS)}{GAP}[{low},{GAP}{high}]{self._unit(name)}"
 
     def sizes(self, names: Sequence[str], sizes: Sequence[Interval]) -> str:
@@ -87,6 +91,14 @@ class Terms:
         """Name an observable with the unit in which it is shown."""
         unit = self.scale(observable)[1]
         return f"{spaced(observable)} [{unit}]" if unit else spaced(observable)
+
+    def at_maximum(self, name: str, size: Interval) -> bool:
+        """Return True if a size's interval ends at the largest size that was explored."""
+        return size.high >= self.mechanisms[name].maximum * (1.0 - AT_MAXIMUM)
+
+    def _ends(self, name: str, size: Interval) -> tuple[str, str]:
+        form = open_end("high") if self.at_maximum(name, size) else "{}"
+        return trimmed(size.low, SIZE_DIGITS), form.format(trimmed(size.high, SIZE_DIGITS))
 
     def _unit(self, name: str) -> str:
         unit = self.mechanisms[name].unit.replace("^2", "²").replace("^3", "³")

@@ -21,6 +21,8 @@ SIGNS: Mapping[str, str] = MappingProxyType(
         ">": "$>$",
         "°": r"$^\circ$",
         "±": r"$\pm$",
+        "≤": r"$\leq$",
+        "≥": r"$\geq$",
         "−": "$-$",
         "×": r"$\times$",
         "·": r"$\cdot$",

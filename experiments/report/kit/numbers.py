@@ -202,6 +202,11 @@ def estimate(value: float, low: float, high: float, decimals: int = 2) -> str:
     return f"{fixed(value, decimals)} {interval((low, high), decimals)}"
 
 
+def open_end(end: str) -> str:
+    """Format of the low or high end of a range beyond which nothing was explored."""
+    return f"{'≤' if end == 'low' else '≥'} {{}}, not explored beyond"
+
+
 def span(ends: Iterable[float], unit: str) -> str:
     """Write an interval of a response as "[low, high]" with its unit."""
     numbers = [quantity(end, unit).removesuffix(unit_sign(unit)).strip() for end in ends]

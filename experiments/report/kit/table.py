@@ -27,6 +27,8 @@ class Column:
     unit: str = ""
     write: Callable[[str], str | Markup] = escape
     """Typesets a text."""
+    around: str = ""
+    """Column of the DataFrame with the format around each number's text, if any, e.g. "≤ {}"."""
 
 
 Layout = list[Column | str]
@@ -101,17 +103,19 @@ def make_table(
         frame = frame.reset_index()
     full = (KNOWN.get(each, Column(each, each)) if isinstance(each, str) else each for each in columns)
     shown = tuple(column for column in full if column.key in frame.columns)
-    cells = [_cells(column, frame[column.key]) for column in shown]
+    cells = [_cells(column, frame[column.key], frame.get(column.around)) for column in shown]
     styles = [""] * len(frame) if marks is None else list(marks)
     rows = tuple(Row(tuple(entries), style) for *entries, style in zip(*cells, styles, strict=True))
     return Table(name, caption, shown, rows, note)
 
 
-def _cells(column: Column, values: pd.Series) -> list[Cell]:
+def _cells(column: Column, values: pd.Series, around: pd.Series | None) -> list[Cell]:
     if column.kind == "text":
         return [Cell("" if _absent(value) else column.write(str(value))) for value in values]
     numbers = [None if _absent(value) else float(value) for value in values]
     texts = KINDS[column.kind](numbers)
+    if around is not None:
+        texts = [form.format(text) for form, text in zip(around, texts, strict=True)]
     return [
         Cell(text, None if number is None else repr(number), numeric=True)
         for number, text in zip(numbers, texts, strict=True)

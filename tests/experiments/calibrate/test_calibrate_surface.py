@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from analytic_heaps import StandInStudy, settings
 
-from doe import Factor, Sample
+from doe import Factor, Goal, Sample, joint_fit
 from experiments.calibrate import ClimbEnd, Outcome
 from experiments.calibrate.cases import StageEnd
 from experiments.calibrate.optimum_stage import find_optimum
@@ -62,12 +63,36 @@ def test_a_half_range_is_a_climb_step_but_not_too_short(step: float, half_range:
 
 # The line E + F = s in coded units lies s / sqrt(2) from the centre, nearest at (s / 2, s / 2). The axial
 # points reach sqrt(2), the runs' circle too: s = 2 passes through the corner of the two-level part.
-@pytest.mark.parametrize(("line", "extent"), [(0.0, 1.0), (-1.9, 1.0)])
-def test_the_nearest_point_of_a_line(line: float, extent: float) -> None:
+@pytest.mark.parametrize("line", [0.0, -1.9])
+def test_the_nearest_point_of_a_line(line: float) -> None:
     optimum = find_optimum(plane_study(), explored(3.0), aim(20.0 + 3.0 * line))
     # Standard error of the fit in coded units: below NOISE / slope; ten of them.
     assert optimum.point == pytest.approx(at_coded(line / 2, line / 2), abs=10 * NOISE / 3.0 * HALF_RANGE)
-    assert optimum.extent == extent
+    assert optimum.extent == pytest.approx(math.sqrt(2.0))
+
+
+def test_a_range_that_ends_where_nothing_was_explored_is_open_there() -> None:
+    region = find_optimum(plane_study(), explored(3.0), aim(20.0)).region
+    assert region.open_ends.to_numpy().all()
+    # The line E + F = 0 meets the circle of the runs, of radius sqrt(2), at -1 and 1: to two cells of .007
+    # and the slant of a band that is ten standard errors wide.
+    ends = [[at_coded(-1, 0)["E"], at_coded(1, 0)["E"]]] * 2
+    assert region.ranges.to_numpy() == pytest.approx(
+        np.array(ends), abs=(0.014 + 10 * NOISE / 3.0) * HALF_RANGE
+    )
+    closed = replace(region, mask=np.linalg.norm(region.coded, axis=1) < 0.5)
+    assert not closed.open_ends.to_numpy().any()
+    band = replace(region, mask=region.explored & (region.coded["E"].abs() < 0.5).to_numpy())
+    assert band.open_ends.to_numpy().tolist() == [[False, False], [True, True]]
+
+
+def test_one_response_and_several_explore_the_same_settings() -> None:
+    surface, target = explored(3.0), aim(20.0)
+    region = find_optimum(plane_study(), surface, target).region
+    joint = joint_fit({"angle": Goal(surface.leading.reduced, target.leading)}).region()
+    assert (region.extent, region.fraction) == (joint.extent, joint.fraction)
+    assert (region.mask == joint.mask).all()
+    assert region.open_ends.equals(joint.open_ends)
 
 
 def test_a_contour_beyond_the_runs_is_no_optimum_although_the_box_reaches_it() -> None:
@@ -97,8 +122,9 @@ def test_a_target_that_the_surface_misses_within_their_errors_has_its_closest_po
     ("truth", "inside", "compatible"),
     [
         ((0.0, 0.0), True, True),
-        ((-1.2, 1.2), True, True),
+        ((-0.9, 0.9), True, True),
         ((0.5, 0.5), True, False),
+        ((-1.2, 1.2), False, None),  # in the box of the axial points, beyond the circle of the runs
         ((-1.5, 1.5), False, None),
     ],
 )
@@ -112,7 +138,10 @@ def test_where_a_hidden_truth_lies(truth: tuple[float, float], inside: bool, com
 def test_a_truth_is_judged_as_the_cells_of_the_region_are() -> None:
     surface = explored(0.02)
     region = find_optimum(plane_study(), surface, aim(20.0)).region
-    cells = np.linspace(0, len(region.mask) - 1, 6).astype(int)
+    inside, outside = (
+        np.flatnonzero(region.explored & (region.mask == belongs)) for belongs in (True, False)
+    )
+    cells = np.concatenate([inside[:: len(inside) // 3], outside[:: len(outside) // 3]])
     truths = [{str(n): float(v) for n, v in region.natural.iloc[cell].items()} for cell in cells]
     judged = [find_optimum(plane_study(), surface, aim(20.0, truth)).truth.compatible for truth in truths]
     assert judged == region.mask[cells].tolist()

@@ -73,6 +73,7 @@ def test_a_card_tells_what_was_fitted_and_what_is_as_good(card: Path, campaign: 
         # Four digits.
         assert entry["chosen"] == pytest.approx(optimum.point[name], rel=5e-4)
         assert entry["low"] == pytest.approx(optimum.region.ranges["low"][name], rel=5e-4)
+        assert entry["not_explored_beyond"] == ["low", "high"]
         assert entry["identified"] == (name not in optimum.unidentified)
     points = np.array(facts["compatible"]["points"])
     assert 30 < len(points) <= 60

@@ -97,6 +97,8 @@ def test_the_values_to_enter_are_those_of_every_factor(campaign: Campaign, study
     assert {name: row[2][1] for name, row in rows.items()} == campaign.optimum.settings
     ranges = campaign.optimum.region.ranges
     assert [cell[1] for cell in rows["E"][4:6]] == [ranges["low"]["E"], ranges["high"]["E"]]
+    assert rows["E"][4][0].startswith("≤ ")
+    assert rows["E"][5][0].endswith(", not explored beyond")
     assert (rows["E"][-1][0], rows["A"][-1][0]) == ("calibrated, left open", "middle of its range")
     assert rows["A"][4][1] is None
 
@@ -123,6 +125,7 @@ def test_texts_to_paste_are_markdown_and_latex(campaign: Campaign, study: Study)
     rows = [line for line in by_name["table-markdown"].splitlines() if line.startswith("| ")]
     assert len(rows) == 2 + len(table.rows) == 10
     assert "| grain Poisson's ratio | A | 1 |" in by_name["table-markdown"]
+    assert re.search(r"\| ≤ [\d.]+, not explored beyond to ≥ [\d.]+, not", by_name["table-markdown"])
     latex = by_name["table-latex"]
     assert latex.count(r" \\") == 1 + len(table.rows)
     assert latex.count(" & ") == 5 * (1 + len(table.rows))

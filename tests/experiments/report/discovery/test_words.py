@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from discoveries import made_discovery
 
-from doe.discrepancy import CalibrationUse, Fit, Verdict
+from doe.discrepancy import CalibrationUse, Fit, Interval, Verdict
 from experiments.report.discovery import Terms, verdict_sentence
 
 
@@ -26,6 +26,13 @@ def test_a_model_that_leans_on_an_allowance_says_so(verdict: Verdict, terms: Ter
     assert f"{words} check that instrument." in sentence
     # a model within an allowance does not lean on it
     assert "fill height (" not in sentence
+
+
+def test_a_size_at_the_largest_that_was_explored_says_so(terms: Terms) -> None:
+    name, most = next((name, one.maximum) for name, one in terms.mechanisms.items())
+    for share, words in ((1.0, f" to ≥ {most:.3g}, not explored beyond)"), (0.9, f" to {0.9 * most:.3g})")):
+        size = terms.size(name, Interval(0.5 * most, 0.7 * most, share * most))
+        assert size.endswith(words)
 
 
 def test_lengths_that_lean_on_one_scale_are_one_instrument(terms: Terms) -> None:
