@@ -5,8 +5,6 @@ Imports of the simulator, the statistics and the pictures are inside the command
 
 from __future__ import annotations
 
-import io
-import sys
 from typing import Annotated
 
 import typer
@@ -21,6 +19,7 @@ from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.heap import HEAP_EXAMPLE, heap
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import show_version
+from experiments.commands.streams import lasting_streams
 from experiments.commands.ui import UI_EXAMPLE, ui
 from experiments.commands.watch import WATCH_EXAMPLE, watch
 
@@ -58,8 +57,5 @@ app.command(epilog=UI_EXAMPLE)(ui)
 
 def main() -> None:
     """Run the command line."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            # a console of another encoding than UTF-8 shows an escape for what it lacks
-            stream.reconfigure(errors="backslashreplace")
-    app()
+    with lasting_streams():
+        app()

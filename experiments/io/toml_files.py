@@ -12,6 +12,9 @@ from typing import Any
 from experiments.io.errors import InputError, StudyError
 from experiments.io.texts import read_text
 
+LARGEST = 500_000
+"""Bytes of the largest file; studies and cards have some thousands."""
+
 DEEPEST = 20
 """Levels of nested tables and lists that a file may have."""
 
@@ -25,7 +28,7 @@ LONGEST_SHOWN = 200
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     """Read a TOML file: its text and its document; StudyError when it cannot be read or is not TOML."""
     try:
-        text = read_text(path).replace("\r\n", "\n")
+        text = read_text(path, LARGEST).replace("\r\n", "\n")
         _check_keys(text)
         document = tomllib.loads(text)
         _check(document)

@@ -23,6 +23,8 @@ GAP = 1e-3
 """Gap between touching spheres, over the smaller radius: text files have six digits."""
 MOST_SPHERES = 1000
 """Most spheres of a clump; a larger file is a heap."""
+LARGEST_CLUMP = 1_000_000
+"""Bytes of the largest file of a clump: a line of a thousand characters for each sphere."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def unit_option(text: str) -> float:
 
 def read_clump(path: Path, unit: str | None = None) -> ClumpFile:
     """Read a clump from a file of spheres in a unit (see `length_unit`); default: the file's own, or mm."""
-    file, place = read_spheres(path), str(path)
+    file, place = read_spheres(path, LARGEST_CLUMP), str(path)
     size, source = _unit(file.unit, unit, place)
     if file.bodies is not None and file.body_count > 1:
         numbers = ", ".join(str(body) for body in np.unique(file.bodies)[:5])

@@ -60,10 +60,10 @@ OTHERS = {
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[IO[bytes]]:
+def _opened(path: Path, largest: int = LARGEST) -> Iterator[IO[bytes]]:
     """Open a file, or what gzip has compressed in it."""
     try:
-        check_file(path, LARGEST)
+        check_file(path, largest)
         with path.open("rb") as file:
             packed = file.peek(len(GZIP)).startswith(GZIP)
             yield cast(IO[bytes], gzip.GzipFile(fileobj=file)) if packed else file
@@ -98,9 +98,13 @@ def require_known(path: Path) -> None:
             raise InputError(str(path), f"is {name}, neither a picture nor a file of spheres", hint=hint)
 
 
-def read_spheres(path: Path) -> SphereFile:
-    """Read a file of spheres in the format of its content, which gzip may have compressed."""
-    found = format_of(path)
+def read_spheres(path: Path, largest: int = LARGEST) -> SphereFile:
+    """Read a file of spheres in the format of its content, which gzip may have compressed.
+
+    Raise InputError for a file of more than `largest` bytes, before it is read.
+    """
+    with _opened(path, largest):
+        found = format_of(path)
     if found is None:
         require_known(path)
         with _opened(path) as file:
@@ -110,15 +114,15 @@ def read_spheres(path: Path) -> SphereFile:
     with _opened(path) as file:
         if not isinstance(file, gzip.GzipFile):
             return found.read(path)
-        return _read_copy(file, path, found)
+        return _read_copy(file, path, found, largest)
 
 
-def _read_copy(packed: IO[bytes], path: Path, found: Format) -> SphereFile:
+def _read_copy(packed: IO[bytes], path: Path, found: Format, largest: int) -> SphereFile:
     with TemporaryDirectory() as folder:
         copy = Path(folder) / path.name.removesuffix(".gz")
-        content = packed.read(LARGEST + 1)
-        if len(content) > LARGEST:
-            raise InputError(str(path), f"must have at most {LARGEST:,} bytes when decompressed")
+        content = packed.read(largest + 1)
+        if len(content) > largest:
+            raise InputError(str(path), f"must have at most {largest:,} bytes when decompressed")
         copy.write_bytes(content)
         try:
             return found.read(copy)
