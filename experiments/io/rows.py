@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,16 +34,28 @@ class Row:
         return InputError(self.place(column), problem, self[column] or "nothing")
 
 
-def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> Iterator[Row]:
+def read_rows(
+    path: Path,
+    needed: Collection[str],
+    known: Collection[str],
+    renamed: Callable[[list[str]], list[str]] | None = None,
+) -> Iterator[Row]:
     """Read the rows of a CSV file in UTF-8; empty rows, and rows that begin with ``#``, are skipped.
 
-    The first row names the columns: all that are needed, and any of the known ones. Raise InputError when the
-    file cannot be read, its columns are not these, or a row has more cells than columns.
+    The first row names the columns: all that are needed, and any of the known ones. With `renamed`, which
+    returns known names and empty ones for columns to ignore, it is the first row with all needed columns.
+    Raise InputError when the file cannot be read, its columns are not these, or a row has more cells than
+    columns.
     """
     header: list[str] = []
-    for line, cells in _lines(path):
+    lines = list(_lines(path))
+    heads = (renamed(cells) for _, cells in lines) if renamed else iter(())
+    found = next((names for names in heads if set(needed) <= set(names)), None)
+    for line, cells in lines:
+        if found is not None and not header and renamed and renamed(cells) != found:
+            continue
         if not header:
-            header = cells
+            header = found or cells
             _check_header(path, line, header, needed, known)
         elif any(cells[len(header) :]):
             problem = f"must have a cell for each of the {len(header)} columns, and no more"
@@ -89,7 +101,7 @@ def _check_header(
         problem = f"the first row must name the columns; missing: {', '.join(missing)}"
         raise InputError(place, problem, ", ".join(header))
     for name in header:
-        if name not in known:
+        if name and name not in known:
             raise InputError(place, f"must be a known column, {nearest_name(name, list(known))}", name)
-        if header.count(name) > 1:
+        if name and header.count(name) > 1:
             raise InputError(place, "names a column twice", name)

@@ -36,11 +36,13 @@ class SizesSection(Section):
 
     sieves: StudyFile | None = None
     """File of a sieve analysis, a CSV relative to the study: opening, and retained, retained_percent or
-    passing_percent, the finest sieve first."""
+    passing_percent, or the names of a laboratory's sheet."""
     counts: StudyFile | None = None
     """File of an image analyser, a CSV relative to the study: a diameter a grain, or from, to and count."""
     unit: str | None = None
     """Unit of the diameters of the file that have no unit, e.g. um."""
+    column: str | None = None
+    """Name of the diameter's column in the file of an image analyser. Default: diameter."""
     distribution: Literal["normal", "lognormal", "rosin-rammler"] | None = None
     """Distribution instead of a file."""
     mean: Length | None = Field(default=None, gt=0.0)
@@ -93,6 +95,8 @@ class SizesSection(Section):
             raise ValueError('a distribution needs by = "number", "volume" or "mass"')
         if self.unit is not None and self.distribution:
             raise ValueError("must have unit only with a file")
+        if self.column is not None and self.counts is None:
+            raise ValueError("must have column only with counts")
         if self.sieves is not None and self.by == "number":
             raise ValueError("a sieve analysis must be by mass or volume, not by number")
         if not self.cut[0] < self.cut[1]:
@@ -146,7 +150,7 @@ def _distribution(section: SizesSection) -> tuple[Distribution, float]:
     if section.sieves is not None:
         return read_sieves(section.sieves, section.unit)
     if section.counts is not None:
-        return read_counts(section.counts, section.unit), 0.0
+        return read_counts(section.counts, section.unit, section.column), 0.0
     first, second = (_term(section, name) for name in TERMS[section.distribution or ""])
     laws: Mapping[str, Any] = {
         "normal": lambda: stats.norm(first, second),

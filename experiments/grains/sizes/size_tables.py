@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,41 +20,92 @@ ROUNDING = 0.5
 
 _MESH_NUMBER = re.compile(r'^ *"?(#\d+)"? *[,;\t] *"?[\d.]', re.MULTILINE)
 
-SIEVE_COLUMNS = ("opening", "retained", "retained_percent", "passing_percent")
+SIEVE_COLUMNS = ("opening", "retained", "retained_percent", "passing_percent", "cumulative_retained_percent")
 COUNT_COLUMNS = ("diameter", "from", "to", "count")
+PANS, SUMS = ("pan", "receiver", "tray", "bottom", "base", "fines"), ("total", "sum")
+"""Openings in words: none at all, and rows that are no sieves."""
+_UNIT = re.compile(r"[(\[]([^()\[\]]*)[)\]]")
+"""Unit in the brackets of a column's name."""
 
 
 def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
-    """Read a sieve analysis with one sieve per row, the finest first.
+    """Read a sieve analysis with one sieve per row, in any order, as laboratories write it.
 
-    Columns: ``opening``, and one of ``retained`` (mass on the sieve), ``retained_percent`` and
-    ``passing_percent``. The opening of a pan is 0. ``unit`` is that of openings without one. Return the
-    distribution by mass between the finest and the coarsest opening, and the part of the mass beyond them.
+    Columns: ``opening``, and one of ``retained`` (mass on the sieve), ``retained_percent``,
+    ``passing_percent`` and ``cumulative_retained_percent``, or what sheets call them (see `_sieve_column`);
+    of several the first in this order counts. The opening of a pan is 0 or in words. ``unit`` is that of
+    openings without one. Return the distribution by mass between the finest and the coarsest opening, and the
+    part of the mass beyond them.
     """
     _refuse_mesh_numbers(path)
-    rows = list(read_rows(path, ("opening",), SIEVE_COLUMNS))
-    column = _one_of(path, rows, SIEVE_COLUMNS[1:])
-    _at_least(path, rows, 2)
-    openings = [_length(row, "opening", unit, zero=True) for row in rows]
+    header = _Header(_sieve_column)
+    found = list(read_rows(path, ("opening",), SIEVE_COLUMNS, header))
+    column = _one_of(path, found, SIEVE_COLUMNS[1:])
+    _at_least(path, found, 2)
+    unit = header.units.get("opening") or unit
+    sieves = [(_opening(row, unit), row) for row in found if row["opening"].lower() not in SUMS]
+    openings, rows = zip(*sorted(sieves, key=lambda sieve: sieve[0]), strict=True)
     for row, (finer, coarser) in zip(rows[1:], pairwise(openings), strict=True):
         if not coarser > finer:
-            raise row.error("must rise from row to row, with the finest sieve or the pan first", "opening")
+            raise row.error("must be another opening than that of the other rows", "opening")
     values = [_number(row, column, "mass" if column == "retained" else "") for row in rows]
     _one_kind(rows, column)
-    if column == "passing_percent":
-        on_each, total = _from_passing(rows, values), 100.0
+    if column == "cumulative_retained_percent":
+        values = [100.0 - value for value in values]
+    if column.startswith(("passing", "cumulative")):
+        on_each, total = _from_passing(rows, values, column), 100.0
     else:
         on_each, total = values, sum(values)
         if column == "retained_percent" and abs(total - 100.0) > ROUNDING:
             problem = f"must add up to 100 within {ROUNDING:g}"
             raise InputError(f"{path}: retained_percent", problem, f"{total:g}")
     # grains on a sieve are larger than its opening, and smaller than the next
-    sieves = zip(openings, openings[1:], on_each, strict=False)
-    between = [(low, high, on) for low, high, on in sieves if low > 0.0]
+    classes = zip(openings, openings[1:], on_each, strict=False)
+    between = [(low, high, on) for low, high, on in classes if low > 0.0]
     kept = sum(on for *_, on in between)
     if not kept > 0.0:
         raise InputError(f"{path}: {column}", "must have mass between two sieves", f"{kept:g}")
     return _tabulated(between, kept), 1.0 - kept / total
+
+
+@dataclass
+class _Header:
+    """Names of a sheet's columns as this module has them, and the units in their brackets."""
+
+    column: Callable[[str, str], str]
+    units: dict[str, str] = field(default_factory=dict)
+
+    def __call__(self, cells: list[str]) -> list[str]:
+        names: list[str] = []
+        for cell in cells:
+            match = _UNIT.search(cell)
+            plain, unit = _UNIT.sub("", cell).strip(), match[1].strip() if match else ""
+            name = self.column(plain, unit)
+            names.append("" if name in names else name)
+            if name and unit and name == names[-1]:
+                self.units[name] = unit
+        return names
+
+
+def _sieve_column(name: str, unit: str) -> str:
+    """Return the column of `SIEVE_COLUMNS` that a laboratory's name means, or an empty text."""
+    letters, share = re.sub(r"[^a-z]", "", name.lower()), "%" in name + unit or "percent" in name.lower()
+    if name in SIEVE_COLUMNS:
+        return name
+    if re.search("opening|aperture|size|diameter", letters) or letters == "sieve":
+        return "opening"
+    if re.search("passing|finer|undersize", letters) and (share or not unit):
+        return "passing_percent"
+    if "retain" in letters and share:
+        return "cumulative_retained_percent" if letters.startswith("cum") else "retained_percent"
+    alone = letters in ("mass", "weight") or ("retain" in letters and not letters.startswith("cum"))
+    return "retained" if alone else ""
+
+
+def _opening(row: Row, unit: str | None) -> float:
+    """Read an opening [m]: 0 for a pan, or for what is finer than a sieve."""
+    word = row["opening"].lower()
+    return 0.0 if word in PANS or word.startswith("<") else _length(row, "opening", unit, zero=True)
 
 
 def _refuse_mesh_numbers(path: Path) -> None:
@@ -65,13 +117,23 @@ def _refuse_mesh_numbers(path: Path) -> None:
         raise InputError(f"{path}:{line}: opening", problem, found[1])
 
 
-def read_counts(path: Path, unit: str | None = None) -> Tabulated:
+def read_counts(path: Path, unit: str | None = None, column: str | None = None) -> Tabulated:
     """Read counts of an image analyser with one grain or one class per row.
 
     Columns: ``diameter``, with or without ``count``; or ``from``, ``to`` and ``count``. ``count`` may be any
-    share: a number, a volume. ``unit`` is that of diameters without one.
+    share: a number, a volume. ``unit`` is that of diameters without one. ``column`` names the diameter among
+    the columns of an analyser's export.
     """
-    rows = list(read_rows(path, (), COUNT_COLUMNS))
+
+    def named(name: str, _: str) -> str:
+        if column is not None:
+            return "diameter" if name.lower() == _UNIT.sub("", column).strip().lower() else ""
+        return name.lower() if name.lower() in COUNT_COLUMNS else name
+
+    header = _Header(named)
+    needed = ("diameter",) if column is not None else ()
+    rows = list(read_rows(path, needed, COUNT_COLUMNS, header))
+    unit = next(iter(header.units.values()), None) or unit
     _at_least(path, rows, 1)
     if "diameter" in rows[0].cells:
         if both := [name for name in ("from", "to") if name in rows[0].cells]:
@@ -98,15 +160,15 @@ def _tabulated(between: Sequence[tuple[float, float, float]], total: float) -> T
     return Tabulated(lows, highs, tuple(share / total for share in shares))
 
 
-def _from_passing(rows: Sequence[Row], passing: Sequence[float]) -> list[float]:
+def _from_passing(rows: Sequence[Row], passing: Sequence[float], column: str) -> list[float]:
     for row, value in zip(rows, passing, strict=True):
         if value > 100.0:
-            raise row.error("must be at most 100", "passing_percent")
+            raise row.error("must be at most 100", column)
     if 0.0 < max(passing) <= 1.0:
-        raise rows[-1].error("must be percent, from 0 to 100, not parts of 1", "passing_percent")
+        raise rows[-1].error("must be percent, from 0 to 100, not parts of 1", column)
     for row, (finer, coarser) in zip(rows[1:], pairwise(passing), strict=True):
         if coarser < finer:
-            raise row.error("must rise with the opening", "passing_percent")
+            raise row.error("must rise with the opening", column)
     return [coarser - finer for finer, coarser in pairwise([*passing, 100.0])]
 
 
@@ -156,8 +218,8 @@ def _one_kind(rows: Sequence[Row], column: str) -> None:
 
 def _one_of(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> str:
     found = [name for name in columns if rows and name in rows[0].cells]
-    if len(found) != 1:
-        raise InputError(str(path), f"needs one column of {', '.join(columns)}", ", ".join(found) or "none")
+    if not found:
+        raise InputError(str(path), f"needs one column of {', '.join(columns)}", "none")
     return found[0]
 
 

@@ -142,9 +142,9 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
             r"sizes.csv:2: opening: needs a unit .*; or write",
         ),
         (
-            "opening,retained\n2,3\n1,4\n",
+            "opening,retained\n1,3\n1,4\n",
             "mm",
-            r"sizes.csv:3: opening: must rise from row.*got 1",
+            r"sizes.csv:3: opening: must be another opening.*got 1",
         ),
         ("opening,retained\n-1,3\n1,4\n", "mm", r"sizes.csv:2: opening: must be positive, got -1"),
         (
@@ -299,3 +299,42 @@ def test_a_wrong_table_is_named_by_the_study_and_by_its_row(write_study: WriteSt
     with pytest.raises(StudyError, match=r"sizes.csv:3: passing_percent: must be at most 100") as caught:
         load_study(with_sizes(write_study, '[grain.sizes]\nsieves = "sizes.csv"\nunit = "mm"\n'))
     assert caught.value.problems[0].place.endswith("grain.sizes")
+
+
+ON_EACH = {"0.5 mm": 60.0, "1 mm": 30.0, "2 mm": 0.0}
+SHEETS = {
+    "coarsest first, with a pan": "Sieve Opening (mm),Mass Retained (g)\n2,0\n1,30\n0.5,60\nPan,10\n",
+    "finest first": "Aperture [um],Retained (%)\n0,10\n500,60\n1000,30\n2000,0\n",
+    "the pan last": "sieve,weight\n0.5 mm,60\n1 mm,30\n2 mm,0\nReceiver,10\n",
+    "what passes": "Sieve size (mm);% passing\n2,0;100\n1,0;70\n0,5;10\n",
+    "cumulative": "Size (mm),Cumulative retained (%)\n2,0\n1,30\n0.5,90\nPan,100\n",
+    "a whole sheet": "Sample,river sand\n"
+    "Sieve No.,Opening (mm),Mass of sieve (g),Mass retained (g),% retained,% finer\n"
+    "10,2,400,0,0,100\n18,1,390,30,30,70\n35,0.5,380,60,60,10\n-,Pan,300,10,10,0\n,Total,,100,100,\n",
+}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_a_laboratorys_sheet_is_read_as_it_is(tmp_path: Path, name: str) -> None:
+    found, unaccounted = read_sieves(table(tmp_path, SHEETS[name]))
+    assert found.lows == pytest.approx([0.5e-3, 1e-3])
+    assert found.highs == pytest.approx([1e-3, 2e-3])
+    assert found.shares == pytest.approx([60.0 / 90.0, 30.0 / 90.0])
+    assert unaccounted == pytest.approx(0.1)
+
+
+def test_an_analysers_export_has_its_diameter_in_a_named_column(
+    write_study: WriteStudy, tmp_path: Path
+) -> None:
+    export = (
+        "Device: analyser\nId,Area [mm2],EQPC [um],Aspect\n1,0.78,1000,0.9\n2,3.1,2000,0.8\n3,3.2,2000,0.7\n"
+    )
+    found = read_counts(table(tmp_path, export), None, "EQPC [um]")
+    assert found == read_counts(table(tmp_path, export), None, "eqpc")
+    assert found.lows == pytest.approx([1e-3, 2e-3, 2e-3])
+    study = '[grain.sizes]\ncounts = "sizes.csv"\ncolumn = "EQPC"\nby = "number"\ndiameter = "volume"\n'
+    mean = load_study(with_sizes(write_study, study)).case({}, seed=1).grains.mixture.shapes[0].radii[0]
+    # the grain of the mean mass of one of 1 mm and two of 2 mm, within the classes' width
+    assert 2.0 * mean == pytest.approx(1e-3 * (17.0 / 3.0) ** (1.0 / 3.0), rel=0.01)
+    with pytest.raises(InputError, match="missing: diameter"):
+        read_counts(table(tmp_path, export), None, "Feret")
