@@ -42,6 +42,7 @@ class ScreenResult:
     error: ErrorTerm
     """Error that the effects are tested against, by the rule ``error_rule``."""
     error_rule: str
+    """One of ``ERRORS``; without dummies "lack of fit": what the factors leave of the runs' means."""
 
     def summary(self) -> str:
         """Return effects, analysis of variance and significant factors as text."""
@@ -205,7 +206,8 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
     replicates = pure_error(coded, values, blocks)
     rule = error or ("dummies" if fit.df_resid > replicates.df else "lenth")
     chosen = _error_term(design, values, fit, replicates, rule)
-    return ScreenResult(design, values, fit, replicates, chosen, rule)
+    named = "lack of fit" if rule == "dummies" and not design.dummies else rule
+    return ScreenResult(design, values, fit, replicates, chosen, named)
 
 
 def aliases(design: Design, interaction: str) -> pd.Series:

@@ -69,6 +69,7 @@ def _decision(
     replicates = int(cases["replicate"].max())
     against = {
         "dummies": "the dummy columns, which hold interactions as the factors' columns do",
+        "lack of fit": "what the factors leave of the runs' means, the design having no dummy columns",
         "lenth": "Lenth's pseudo standard error, the design having no dummies",
     }[result.error_rule]
     return Decision(

@@ -38,6 +38,9 @@ def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     own = {key: value for key, value in document.items() if key != MATERIAL}
     if MATERIAL not in document:
         return own
+    if isinstance(document[MATERIAL], Mapping):
+        hint = f'A study takes its values by  {MATERIAL} = "FILE"; dem-warp new NAME writes a study.'
+        raise StudyError(MATERIAL, "this file is a material card, not a study", hint=hint)
     path = folder / str(document[MATERIAL])
     sections = read_card(path)
     check_laws(own, sections, path)

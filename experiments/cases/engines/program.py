@@ -139,7 +139,8 @@ def _gather(
         if on_progress:
             done, total = len(results), len(begun)
             seconds = time.perf_counter() - started
-            on_progress(Progress(done, total, done / total, {"run": total - done}, seconds))
+            running = sum(future.running() for future in pending)
+            on_progress(Progress(done, total, done / total, {"run": running}, seconds))
     return [results[index] for index in range(len(begun))]
 
 

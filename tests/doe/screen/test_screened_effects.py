@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import statsmodels.formula.api as smf
 
-from doe import DesignError, Factor, plackett_burman, screen
+from doe import DesignError, Factor, box_behnken, plackett_burman, screen
 
 FACTORS = [Factor(name, 0.0, 1.0) for name in "ABCDEFGH"]
 EFFECTS = np.array([4.0, 0.0, -2.0, 0.0, 0.0, 1.0, 0.0, 0.0])
@@ -86,6 +86,17 @@ def test_saturated_design_needs_another_error():
     assert screen(design, response).error_rule == "lenth"
     assert screen(design, response).error_df == pytest.approx(11 / 3)
     assert screen(design, np.column_stack([response, response + 0.1]), error="pooled").error_df == 12
+
+
+def test_a_table_without_dummy_columns_is_not_tested_against_dummies():
+    design = box_behnken([Factor(f"x{i}", 0.0, 1.0) for i in range(3)])
+    response = design.points["x0"].to_numpy() + np.random.default_rng(8).normal(size=len(design.coded))
+    result = screen(design, response)
+    assert result.error_rule == "lack of fit"
+    assert repr(result).endswith("significant at 0.05 against lack of fit: x0")
+    assert "dumm" not in result.summary()
+    with_dummies = plackett_burman([Factor(f"x{i}", 0.0, 1.0) for i in range(5)])
+    assert "against dummies" in repr(screen(with_dummies, np.random.default_rng(9).normal(size=12)))
 
 
 def test_lenth_pseudo_error_by_hand():

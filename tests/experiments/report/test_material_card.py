@@ -120,6 +120,12 @@ def test_what_is_no_card_is_refused(tmp_path: Path, content: str | None, rule: s
         load_study(tmp_path / "test.toml")
 
 
+def test_a_card_in_the_place_of_a_study_is_called_a_card(card: Path) -> None:
+    with pytest.raises(StudyError, match=r"this file is a material card, not a study") as refused:
+        load_study(card)
+    assert "{" not in str(refused.value)
+
+
 def test_two_clumps_of_one_name_stay_two(tmp_path: Path) -> None:
     files = {"a/grain.txt": "0 0 0 1\n", "b/grain.txt": "0 0 0 2\n", "c/grain.txt": "0 0 0 1\n"}
     for name, text in files.items():

@@ -3,6 +3,7 @@
 import sys
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ import pandas as pd
 import pytest
 from commandline import dem_warp
 
+from dem_warp import CaseResult, Progress
 from experiments.cases import OwnWorkers, Store, engine_of, run_cases
+from experiments.cases.engines.program import _gather
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
@@ -74,3 +77,17 @@ def test_a_heap_that_cannot_be_drawn_has_a_reason(write_study: Write, tmp_path: 
     assert (code, "no heap" in err) == (1, True)
     assert (out / "heap.vtp").exists()
     assert not (out / "snapshot.png").exists()
+
+
+def test_only_the_programs_that_run_are_counted_as_running() -> None:
+    begun: dict[Future[CaseResult], int] = {Future(): index for index in range(8)}
+    next(iter(begun)).set_running_or_notify_cancel()  # one worker
+    seen: list[Progress] = []
+
+    def watch(progress: Progress) -> None:
+        seen.append(progress)
+        raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        _gather(begun, None, watch)
+    assert (seen[0].done, seen[0].total, seen[0].phase_counts) == (0, 8, {"run": 1})
