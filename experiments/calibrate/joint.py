@@ -89,9 +89,13 @@ def _purchase(joint: JointFit) -> Decision:
     elif with_first[best] > NO_HELP * alone:
         outcome = f"No response makes the {first}'s region smaller by more than {1.0 - NO_HELP:.0%}."
     else:
+        whole, part = float(table["share"].iloc[-1]), with_first[best]
         outcome = (
-            f"{best} buys most: with it {with_first[best] / alone:.0%} of the {first}'s region are left. All "
-            f"together leave {table['share'].iloc[-1] / alone:.0%} of it."
+            f"{best} buys most: with it {part / alone:.0%} of the {first}'s region are left. All together "
+            f"leave {whole / alone:.0%} of it"
+        )
+        outcome += (
+            ": the others buy nothing, and each more makes every test stricter." if whole > part else "."
         )
     return Decision(
         STAGE,

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from contextlib import suppress
 
 import numpy as np
+import pandas as pd
 
 from doe import Goal, JointFit, Region, Sample, Surface, TargetError, joint_fit
 from experiments.calibrate.cases import StageEnd, middle
 from experiments.calibrate.joint import choose_jointly, joint_decisions
 from experiments.calibrate.results import (
     Decision,
+    FittedResponse,
     OptimumResult,
     Outcome,
     SurfaceResult,
@@ -51,7 +53,6 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     else:
         (point, rule), region = choose_jointly(joint, settings), joint.region()
     prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
-    likely = (prediction["confidence_low"], prediction["confidence_high"])
     unidentified = _unidentified(settings, region)
     truth = (
         None
@@ -60,14 +61,15 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     )
     numbers = numbered_values("chosen", point)
     numbers |= {key_of("prediction", response): prediction["mean"]}
+    if surface.leading.reduced.dropped:
+        numbers |= {key_of("prediction of the full model", response): full_mean(prediction)}
     numbers |= {key_of("se of the fit", response): prediction["se"]}
     decisions = [
         Decision(
             STAGE,
             rule,
             numbers,
-            f"Chosen: {listed(point)}; the surface of the {response.name} predicts "
-            f"{quantity(prediction['mean'], response.unit)} ({interval_text(likely, response.unit)}).",
+            f"Chosen: {listed(point)}; the {_predicted(surface.leading, prediction, response)}.",
         ),
         _region_decision(settings, region, unidentified, joint),
     ]
@@ -87,6 +89,21 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
         decisions=tuple(decisions),
         joint=joint,
     )
+
+
+def full_mean(prediction: pd.Series) -> float:
+    """Return what the full model predicts: the middle of its interval, as ``Surface.predict`` has it."""
+    return float(prediction["confidence_low"] + prediction["confidence_high"]) / 2.0
+
+
+def _predicted(found: FittedResponse, prediction: pd.Series, response: Response) -> str:
+    """Write what the surface predicts, with the model that each number comes from."""
+    unit, mean = response.unit, quantity(prediction["mean"], response.unit)
+    interval = interval_text((prediction["confidence_low"], prediction["confidence_high"]), unit)
+    if not found.reduced.dropped:
+        return f"surface of the {response.name} predicts {mean} ({interval})"
+    full = f"the full one, whose errors count, {quantity(full_mean(prediction), unit)} ({interval})"
+    return f"reduced surface of the {response.name} predicts {mean}; {full}"
 
 
 def _choose(

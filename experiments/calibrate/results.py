@@ -40,6 +40,7 @@ class Outcome(StrEnum):
     NO_SIGNIFICANT_FACTOR = "no-significant-factor"
     TARGET_NOT_REACHED = "target-not-reached"
     PLATEAU = "plateau"
+    BOX_TOO_SMALL = "box-too-small"
     NO_CONTOUR = "no-contour"
     TOO_MANY_FAILED_RUNS = "too-many-failed-runs"
 
@@ -280,6 +281,11 @@ class OptimumResult(StageResult):
     decisions: tuple[Decision, ...]
     joint: JointFit | None = None
     """All responses together; None where there is one."""
+
+    @property
+    def pins_nothing(self) -> bool:
+        """True where the target pins down none of the kept factors."""
+        return set(self.unidentified) == set(self.point)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the contour, the compatible range of each factor and the joint fit."""

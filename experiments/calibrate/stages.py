@@ -112,7 +112,7 @@ def _run(study: Study, record: _Record) -> tuple[Outcome, str]:
     path = climb(study, screening, selection.kept, noise, target, record.run)
     require_crossing(study, record.keep("climb", path), target)
     surface = record.keep("surface", explore_surface(study, path, record.run))
-    require_slope(study, surface)
+    require_slope(study, surface, path)
     optimum = record.keep("optimum", find_optimum(study, surface, target))
     verification = record.keep("verification", verify(study, optimum, target, record.run))
     return _verdict(study, optimum, verification)
@@ -163,6 +163,8 @@ def _verdict(study: Study, optimum: OptimumResult, verification: VerificationRes
     )
     said = [f"equivalence is shown for {', '.join(shown)}"] if shown else []
     as_good = f"{optimum.region.fraction:.0%} of the settings that the surface covers are compatible with it."
+    if optimum.pins_nothing:
+        as_good += " None of the values is pinned down."
     if verification.verified:
         return Outcome.CALIBRATED, f"{found}; {'; '.join(said)}. {as_good}"
     said += [f"equivalence is not shown for {', '.join(unproven)}: add replicates"]

@@ -18,7 +18,14 @@ from experiments.calibrate.cases import (
     response_table,
     too_many_failed,
 )
-from experiments.calibrate.results import ClimbResult, Decision, FittedResponse, Outcome, SurfaceResult
+from experiments.calibrate.results import (
+    ClimbEnd,
+    ClimbResult,
+    Decision,
+    FittedResponse,
+    Outcome,
+    SurfaceResult,
+)
 from experiments.calibrate.values import (
     UNLIMITED,
     fixed_values,
@@ -26,6 +33,7 @@ from experiments.calibrate.values import (
     listed,
     numbered_values,
     p_text,
+    quantity,
     worded,
 )
 from experiments.studyfile import Study
@@ -60,14 +68,18 @@ def explore_surface(study: Study, climb: ClimbResult, runner: Runner) -> Surface
     return SurfaceResult(found, cases, design, center, half_range, outside, tuple(decisions))
 
 
-def require_slope(study: Study, result: SurfaceResult) -> None:
+def require_slope(study: Study, result: SurfaceResult, climb: ClimbResult) -> None:
     """Go on when the leading response's reduced surface has a term left; else StageEnd."""
     if not result.leading.reduced.terms:
-        name = next(iter(result.responses))
+        response = study.target.leading
+        noise = quantity(result.leading.full.residual_ms**0.5, response.unit)
+        crossed = ", although the climb crossed the target" if climb.end is ClimbEnd.CROSSED else ""
         raise StageEnd(
-            Outcome.PLATEAU,
-            f"Around {worded(study, result.center)} no term of the surface is significant: the {name} does "
-            "not depend on them beyond the noise. Widen surface.half_range or add replicates.",
+            Outcome.BOX_TOO_SMALL,
+            f"Around {worded(study, result.center)} no term of the surface is significant{crossed}: the box "
+            f"of the design ({listed(result.half_range)} to each side) is too small for the noise of the "
+            f"{response.name} ({noise} from case to case). Widen [campaign.surface] half_range, or raise its "
+            "replicates.",
         )
 
 

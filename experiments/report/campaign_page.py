@@ -16,7 +16,7 @@ from experiments.report.solid import SolidHeap
 from experiments.report.stage_tables import values_table
 from experiments.report.study_companion import companion_of
 from experiments.report.study_facts import study_facts
-from experiments.report.verdict import HEADLINES, verdict_sentence
+from experiments.report.verdict import HEADLINES, headline, verdict_sentence
 from experiments.studyfile import Study
 
 
@@ -44,13 +44,13 @@ def render_page(
     drawn_on = {
         "campaign": campaign,
         "study": study,
-        "headline": HEADLINES[campaign.outcome],
+        "headline": headline(campaign),
         "sentence": verdict_sentence(campaign),
         "cautions": cautions(campaign, study),
         "values": values,
         "pastes": pastes(campaign, study, provenance or {}),
         "solid": solid,
-        "calibrated": campaign.outcome is Outcome.CALIBRATED,
+        "calibrated": headline(campaign) == HEADLINES[Outcome.CALIBRATED],
         "unreached": [TITLES[name] for name in STAGES if name not in campaign.stages],
         "leading": context.leading,
         "labels": labels,

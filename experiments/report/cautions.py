@@ -99,8 +99,9 @@ def _open_region(campaign: Campaign, study: Study) -> Iterator[Caution]:
     elif optimum.unidentified:
         names = enumeration(f"{study.labels[name]} ({name})" for name in optimum.unidentified)
         what = "These responses leave" if optimum.joint else "The target alone leaves"
+        cure = say("caution.several_leave_open" if optimum.joint else "caution.one_leaves_open")
         share = fixed(100.0 * optimum.region.fraction, 0)
-        yield Caution(say("caution.wide_region", share=share, what=what, names=names), "optimum")
+        yield Caution(say("caution.wide_region", share=share, what=what, names=names, cure=cure), "optimum")
 
 
 def _poor_surface(campaign: Campaign, study: Study) -> Iterator[Caution]:

@@ -25,14 +25,20 @@ def goals_table(campaign: Campaign) -> Table:
     marks: list[str] | None = None
     if optimum is not None and optimum.joint is not None:
         tests = optimum.joint.tests(optimum.point)
-        table = table.join(tests[["t", "p"]])
+        table = table.join(tests[["fitted", "t", "p"]])
         apart = tests.index[~tests["agrees"]]
         marks = ["failed" if name in apart else "" for name in table.index]
     shown: Layout = [
         *("response", "scene", "unit"),
         *columns("free", target="target", sd="sd"),
         "n",
-        *columns("free", target_se="se", noise="sd of one case", fitted="fit at the chosen point"),
+        *columns(
+            "free",
+            target_se="se",
+            noise="sd of one case",
+            reduced="fit there, reduced model",
+            fitted="full model",
+        ),
         Column("t", "errors off", "ratio"),
         "p",
         Column("fresh", "fresh cases", "free"),
@@ -40,7 +46,10 @@ def goals_table(campaign: Campaign) -> Table:
     ]
     note = "Scene: the study's own, or a further one by its name. The first response leads the climb."
     if "t" in table:
-        note += " Errors off: the difference of fit and target, over the errors of both together."
+        note += (
+            " There: at the chosen point. Errors off and p: the full model's fit less the target, over the "
+            "errors of both together. The reduced model lacks the terms that are not significant."
+        )
     return make_table("responses", table, shown, "Every response and its target.", note, marks)
 
 
@@ -56,7 +65,7 @@ def _goal(campaign: Campaign, response: Response) -> dict[str, Any]:
         facts["noise"] = campaign.noise_floor.responses[name].sd
     if campaign.optimum is not None and campaign.surface is not None and not response.held_out:
         fit = campaign.surface.responses[name].reduced
-        facts["fitted"] = float(fit.predict(campaign.optimum.point)["mean"].iloc[0])
+        facts["reduced"] = float(fit.predict(campaign.optimum.point)["mean"].iloc[0])
     if campaign.verification is not None:
         test = campaign.verification.responses[name]
         facts |= {"fresh": test.a.mean, "fresh_p": test.p}
@@ -155,8 +164,8 @@ def _surfaces_table(result: SurfaceResult) -> Table:
         "response",
         Column("cases", "cases", "label"),
         Column("terms", "terms kept", write=_terms),
-        *columns("ratio", r2="R²", r2_predicted="R² predicted"),
-        *columns("p", p_model="p of the model", p_lack="p of lack of fit"),
+        *columns("ratio", r2="R², reduced", r2_predicted="R² predicted, reduced"),
+        *columns("p", p_model="p of the full model", p_lack="p of its lack of fit"),
     ]
     return make_table("response-surfaces", table, shown, "Surfaces of the responses.")
 

@@ -15,10 +15,18 @@ HEADLINES = {
     Outcome.NO_SIGNIFICANT_FACTOR: "No significant factor",
     Outcome.TARGET_NOT_REACHED: "Target not reached",
     Outcome.PLATEAU: "Plateau before the target",
+    Outcome.BOX_TOO_SMALL: "Box of the surface too small for the noise",
     Outcome.NO_CONTOUR: "No setting gives the target",
     Outcome.TOO_MANY_FAILED_RUNS: "Too many failed runs",
 }
 """Outcomes in a few words."""
+
+
+def headline(campaign: Campaign) -> str:
+    """Say in a few words how a campaign ended."""
+    if campaign.outcome is Outcome.CALIBRATED and campaign.optimum and campaign.optimum.pins_nothing:
+        return "Target met; values not pinned"
+    return HEADLINES[campaign.outcome]
 
 
 def verdict_sentence(campaign: Campaign) -> str:

@@ -116,6 +116,9 @@ def test_the_best_buy_is_the_response_whose_slopes_cross_the_angles() -> None:
     assert list(joint.shrinkage.index) == ["angle", "density", "left"]
     bought = next(d for d in campaign.decisions if "buys most" in d.outcome)
     assert bought.outcome.startswith("density buys most")
+    # A repeated response leaves more than the best pair: the words say why.
+    shares = joint.shrinkage["share"].iloc[-1], joint.shrinkage["with_first"]["density"]
+    assert (shares[0] > shares[1]) == bought.outcome.endswith("each more makes every test stricter.")
 
 
 def test_a_response_that_repeats_the_angle_leaves_its_direction_open() -> None:

@@ -40,12 +40,14 @@ def explored(slope: float, step: float = 0.1, **decisions: Mapping) -> SurfaceRe
         angle = 20.0 + slope * (table["E"] + table["F"] - 2.0) / HALF_RANGE + noise
         return table.assign(status="finished", reason="", angle=angle)
 
-    path = pd.DataFrame(CENTER, index=[1])
-    step_by_name = dict.fromkeys(CENTER, step)
-    climb = ClimbResult(
+    return explore_surface(plane_study(**decisions), crossed_climb(step), heaps)
+
+
+def crossed_climb(step: float = 0.1) -> ClimbResult:
+    path, step_by_name = pd.DataFrame(CENTER, index=[1]), dict.fromkeys(CENTER, step)
+    return ClimbResult(
         pd.DataFrame(), ("E", "F"), path, step_by_name, ClimbEnd.CROSSED, CENTER, 1.0, 1, decisions=()
     )
-    return explore_surface(plane_study(**decisions), climb, heaps)
 
 
 def aim(mean: float, truth: dict[str, float] | None = None) -> TargetResult:
@@ -165,7 +167,11 @@ def test_a_surface_without_slope_is_a_plateau() -> None:
     surface, named = explored(0.0, surface={"reduce_alpha": 1e-6}), plane_study()
     assert surface.leading.reduced.terms == ()
     with pytest.raises(StageEnd) as end:
-        require_slope(named, surface)
-    assert end.value.outcome is Outcome.PLATEAU
+        require_slope(named, surface, crossed_climb())
+    assert end.value.outcome is Outcome.BOX_TOO_SMALL
+    assert (
+        "although the climb crossed the target: the box of the design (E = 0.4, F = 0.4" in end.value.reason
+    )
+    assert "Widen [campaign.surface] half_range, or raise its replicates." in end.value.reason
     assert "Around parameter E (E) 1, parameter F (F) 1 no term" in end.value.reason
-    require_slope(named, explored(3.0))
+    require_slope(named, explored(3.0), crossed_climb())

@@ -62,7 +62,7 @@ def test_a_paragraph_does_not_repeat_what_a_decision_says(
 
 
 def test_cautions_come_before_the_values(page_text: str) -> None:
-    texts = ("Calibrated.", "Before you use these values", "Enter these values")
+    texts = ("Target met; values not pinned.", "Before you use these values", "Enter these values")
     places = [page_text.index(text) for text in texts]
     assert places == sorted(places)
 

@@ -48,6 +48,11 @@ def test_the_page_says_what_each_response_buys_and_takes(found: Campaign, respon
 
 def test_the_page_shows_targets_directions_and_planes(found: Campaign, responses_page) -> None:
     assert [row[0][0] for row in responses_page.rows("responses")] == ["angle", "density", "flow"]
+    tests = found.optimum.joint.tests(found.optimum.point)
+    goals = responses_page.values("responses")
+    fitted = np.isclose(goals, tests["fitted"].to_numpy()[:, None], rtol=1e-12)
+    assert fitted.any(axis=1).all()  # the fit next to p is that of the model that p comes from
+    assert "Another kind of test" not in responses_page.text
     assert len(responses_page.rows("directions")) == len(found.selection.kept)
     assert {"joint-shares", "joint-E-G"} <= set(responses_page.charts)
     assert "42 mm" in responses_page.text  # the hopper, among what was simulated
