@@ -16,7 +16,10 @@ UI_EXAMPLE = "Example: [bold]dem-warp ui mygrains[/]"
 def ui(
     folder: Annotated[
         Path | None,
-        typer.Argument(metavar="DIR", help="Folder of the files and the runs. Default: the current folder."),
+        typer.Argument(
+            metavar="DIR",
+            help="Folder of the files and the runs, made if it is missing. Default: the current folder.",
+        ),
     ] = None,
     port: Port = 0,
     no_browser: NoBrowser = False,
@@ -34,7 +37,8 @@ def ui(
         from experiments.live.ui.start_routes import ui_app
 
         chosen = (folder or Path()).absolute()
-        if not chosen.is_dir():
-            raise InputError(str(folder), "no such folder")
+        if chosen.exists() and not chosen.is_dir():
+            raise InputError(str(folder), "must be a folder, and is a file")
+        chosen.mkdir(parents=True, exist_ok=True)
         messages.print(f"Working in {chosen}. Open this address; Ctrl-C ends it:")
         serve(port, not no_browser, lambda token: ui_app(chosen, token), typer.echo)

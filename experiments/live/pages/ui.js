@@ -79,7 +79,7 @@ function values() {
 
 async function attempt(place, button, work) {
   show(place, false);
-  button.disabled = true;
+  if (button) button.disabled = true;
   try {
     return await work();
   } catch (error) {
@@ -87,7 +87,7 @@ async function attempt(place, button, work) {
     show(place, true);
     return null;
   } finally {
-    button.disabled = false;
+    if (button) button.disabled = false;
   }
 }
 
@@ -138,9 +138,9 @@ async function measure() {
   for (const file of files) {
     await request(`upload/${encodeURIComponent(folder)}/${encodeURIComponent(file.name)}`, file);
   }
-  photoFolder = folder;
   const fit = document.querySelector('[data-place="measurement.fit"]').value;
   const measured = await ask("angles", { folder, fit });
+  photoFolder = folder;
   const rows = measured.rows.map((row) => [row.picture, row.left, row.right, row.mean, row.se,
     [row.reason, ...row.doubts].filter(Boolean).join("; ")]);
   byId("angles").replaceChildren(table(["picture", "left", "right", "mean", "se", "doubts"], rows, "Measured photographs"));
@@ -165,6 +165,7 @@ async function draft() {
     if (clumpFile !== name) await preview(name);
     clumpFile = name;
   }
+  if (chosen("target") === "pictures" && !photoFolder) await measure();
   // a draft with an error is shown too, with its error
   const answer = await fetch("api/draft", { method: "POST", headers: { "X-Dem-Warp": "1" },
     body: JSON.stringify({ name: value("name"), values: values(), factors: factors() }) });
@@ -194,14 +195,14 @@ const runAsked = () => ({ command: value("command"), file: value("study"), scale
 
 async function plan() {
   show("measured-field", value("command") === "discover");
-  byId("run-command").textContent = "";
-  if (!value("study")) return;
-  await attempt("run-error", byId("start"), async () => {
-    byId("run-command").textContent = (await ask("plan", runAsked())).command;
-  });
+  // A click on Start ends the change of a field, which asks for this plan: Start stays enabled, and where it is
+  let command = "";
+  if (value("study")) await attempt("run-error", null, async () => ({ command } = await ask("plan", runAsked())));
+  byId("run-command").textContent = command;
 }
 
 async function start() {
+  if (!value("study")) throw new Error("Write the study file first.");
   await ask("start", runAsked());
   await refreshRuns();
 }
@@ -284,6 +285,7 @@ byId("form").addEventListener("change", (event) => {
   if (event.target.name === "shape" || event.target.name === "target" || event.target.id === "solid") choose();
   if (event.target.id === "test") fillTest();
   if (["mesh", "unit", "solid", "sizes", "spheres", "tolerance", "protrusion", "name"].includes(event.target.id)) clumpFile = "";
+  if (["photos", "name"].includes(event.target.id)) photoFolder = "";
   if (["study", "command", "scale", "device", "out", "measured"].includes(event.target.id)) plan();
 });
 const onClick = (id, place, work) => byId(id).addEventListener("click", () => attempt(place, byId(id), work));

@@ -290,12 +290,12 @@ def test_from_an_stl_to_a_heap_in_the_browser(
         wait(page, "document.querySelector('#written').innerText === 'Wrote rye.toml.'")
         study = load_study(folder / "rye.toml")
         assert study.case({}, seed=1).grains.shape.sphere_count == 2
+        wait(page, "document.querySelector('#study').value === 'rye.toml'")
         page.select_option("#command", "heap")
         page.fill("#device", "cpu")
-        page.press("#device", "Tab")
+        page.click("#start")  # ends the change of the field, and counts
         command = "dem-warp heap rye.toml --out out/rye-heap-1 --device cpu"
         wait(page, f"document.querySelector('#run-command').innerText === {command!r}")
-        page.click("#start")
         wait(page, "document.querySelector('#runs .badge.finished')")
         check(page, place)
         link = page.evaluate("document.querySelector('#runs a').href")
@@ -317,12 +317,13 @@ def test_photographs_become_the_target(
         wait(page, READY)
         page.click("input[value=pictures]")
         page.set_input_files("#photos", pictures)
+        page.click("#draft")  # pictures that were not measured are measured now
+        wait(page, "document.querySelector('#text').value.includes('pictures = \"mygrain-photos\"')")
         page.click("#measure")
-        wait(page, "document.querySelectorAll('#angles tbody tr').length === 3")
+        wait(page, "!document.querySelector('#measure').disabled")
+        assert page.evaluate("document.querySelectorAll('#angles tbody tr').length") == 3
         assert page.evaluate("document.querySelector('#angles-command').innerText").startswith(
             "dem-warp angle"
         )
-        page.click("#draft")
-        wait(page, "document.querySelector('#text').value.includes('pictures = \"mygrain-photos\"')")
         check(page, place)
     assert len(list((folder / "mygrain-photos").iterdir())) == 3

@@ -141,7 +141,7 @@ HOSTILE = {
         add='[engine]\ncommand = "no-such-solver"\n'
     ),
     "no folder to watch": Hostile("watch none", ("no such folder",)),
-    "no folder to start in": Hostile("ui none", ("no such folder",)),
+    "no folder to start in": Hostile("ui s.txt", ("s.txt", "must be a folder"), {"s.txt": "x"}),
     "a used folder for a campaign": small("calibrate s.toml --device cpu --out .", "folder is not empty"),
     "a used folder for a search": Hostile(
         "discover s.toml m.csv --device cpu --out .", ("folder is not empty. Add --resume",),
