@@ -21,6 +21,9 @@ from imaging.photo.picture_file import focal_length, read_picture
 from imaging.photo.view_settings import View
 from imaging.picture_error import PictureError
 
+LEAST_CORRECTION = 0.05
+"""Correction for the camera's height [degrees] that is mentioned: a digit of the drawn angles."""
+
 
 @dataclass(frozen=True)
 class ReposeAngle:
@@ -32,6 +35,10 @@ class ReposeAngle:
     """Part of the flanks that the lines were fitted to."""
     outline: Outline
     """Outline that the lines were fitted to."""
+
+    def __str__(self) -> str:
+        found = f"{self.mean:.2f} +- {self.se:.2f} degrees, left {self.left:.2f}, right {self.right:.2f}"
+        return "; ".join((found, *map(str, self.doubts)))
 
     @property
     def left(self) -> float:
@@ -47,6 +54,15 @@ class ReposeAngle:
     def mean(self) -> float:
         """Mean of both flanks [degrees]; a tilt of the camera cancels here to first order."""
         return 0.5 * (self.left + self.right)
+
+    @property
+    def correction(self) -> str:
+        """Correction for the camera's height in words; empty where it is less than 0.05 degrees."""
+        seen = self.left_line.angle, self.right_line.angle
+        if max(abs(seen[0] - self.left), abs(seen[1] - self.right)) < LEAST_CORRECTION:
+            return ""
+        lines = f"lines seen at {seen[0]:.1f} and {seen[1]:.1f} degrees"
+        return f"{lines}, {self.left:.1f} and {self.right:.1f} corrected for the camera's height"
 
     @property
     def se(self) -> float:

@@ -24,7 +24,7 @@ from experiments.cases.store.store import Store
 from experiments.cases.workers.own import THIS_MACHINE
 from experiments.cases.workers.workers import Workers
 from experiments.io.errors import StudyError
-from experiments.measurement.case_observables import Observed, observe
+from experiments.measurement.case_observables import Observed, observe, with_bulk_density
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.observables import ANGLE
@@ -252,8 +252,8 @@ def run_cases(
             outcome.add_done_callback(partial(note, key))
         outcomes |= {key: outcome.result() for key, outcome in stored.items()}
     rows = [
-        outcomes[key] if key else _outcome("refused", Observed(reason=reason))
-        for key, reason in zip(keys, refused, strict=True)
+        with_bulk_density(outcomes[key], case) if case else _outcome("refused", Observed(reason=reason))
+        for key, case, reason in zip(keys, cases, refused, strict=True)
     ]
     results = pd.DataFrame(rows, index=table.index)
     results["case_key"] = keys

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from experiments.commands.console import clear_errors, fail, plain
+from experiments.commands.console import clear_errors, fail, plain, shown_count
 from experiments.commands.options import AsJson
 from experiments.commands.results import print_angles, print_findings
 
@@ -99,14 +99,17 @@ def angle(
         options = photographs.PictureOptions(fit, view, heaps, by, keep_doubtful)
         if as_target:
             photographs.require_separate(pictures, options, "--target")
-        rows = photographs.measure_pictures(pictures, options, overlay)
-        if as_target:
-            typer.echo(photographs.target_text(rows, options), nl=False)
-        elif as_csv:
-            typer.echo(plain(photographs.csv_table(rows)), nl=False)
-        else:
-            _print_mean(rows, options, as_json)
-    print_findings(rows)
+        with shown_count("pictures", len(pictures)) as watch:
+            rows = photographs.measure_pictures(pictures, options, overlay, watch)
+        try:
+            if as_target:
+                typer.echo(photographs.target_text(rows, options), nl=False)
+            elif as_csv:
+                typer.echo(plain(photographs.csv_table(rows)), nl=False)
+            else:
+                _print_mean(rows, options, as_json)
+        finally:
+            print_findings(rows)
     if rejected := [row["reason"] for row in rows if row["reason"]]:
         fail("\n".join(rejected))
 

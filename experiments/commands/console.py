@@ -10,7 +10,8 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -226,6 +227,25 @@ class CaseProgress:
         elif progress.seconds - self._last_line >= LINE_EVERY:
             self._last_line = progress.seconds
             messages.print(f"{self._title}: {100.0 * progress.fraction:.0f} %, {state}")
+
+
+@contextmanager
+def shown_count(title: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Show how many of some things are done, to be called with their number."""
+    started = last = time.monotonic()
+    with Progress(*Progress.get_default_columns(), console=messages, transient=True) as bar:
+        task = bar.add_task(title, total=total, visible=False)
+
+        def watch(done: int) -> None:
+            nonlocal last
+            now = time.monotonic()
+            bar.update(task, completed=done, visible=now - started > QUIET_START)
+            if not messages.is_terminal and now - last > LINE_EVERY and done < total:
+                last = now
+                left = duration((now - started) / done * (total - done))
+                messages.print(f"{title}: {done} of {total}, {left} left")
+
+        yield watch
 
 
 def describe_progress(progress: BatchProgress, first: BatchProgress | None = None) -> str:

@@ -104,5 +104,7 @@ def print_findings(rows: Sequence[Mapping[str, Any]]) -> None:
     for row in rows:
         if row["mean"] is not None and row["source"] != "photograph":
             messages.print(f"Read: {row['picture']}: {row['source']}")
+        if row["correction"]:
+            messages.print(f"Corrected: {row['picture']}: {row['correction']}")
         for doubt in row["doubts"]:
             messages.print(f"Doubtful: {row['picture']}: {doubt}")

@@ -7,8 +7,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dem_warp import CaseResult
-from experiments.studyfile.observables import BY_NAME, NAMES, OBSERVABLES, OUTLINE, View
+from dem_warp import Case, CaseResult
+from experiments.studyfile.observables import (
+    BULK_DENSITY,
+    BY_NAME,
+    NAMES,
+    OBSERVABLES,
+    OUTLINE,
+    SOLID_FRACTION,
+    View,
+)
 from experiments.studyfile.study import MeasurementSection
 from imaging import HeapAngle, PictureError, heap_angle
 
@@ -55,6 +63,13 @@ def observe(settings: MeasurementSection, result: CaseResult, leaves_a_heap: boo
     wanted = (*OBSERVABLES, *(OUTLINE if settings.outline else ()))
     seen = {each.column: each.in_heap(heap, views) for each in wanted if each.by_photograph}
     return Observed(seen | reported, heap)
+
+
+def with_bulk_density(observables: Mapping[str, float], case: Case) -> dict[str, float]:
+    """Add the bulk density [kg/m3] to the observables of a case with a filling."""
+    if SOLID_FRACTION not in observables:
+        return dict(observables)
+    return {**observables, BULK_DENSITY: observables[SOLID_FRACTION] * case.grain_material.density}
 
 
 def measure(

@@ -108,12 +108,16 @@ def require_separate(pictures: Sequence[Path], options: PictureOptions, place: s
 
 
 def measure_pictures(
-    pictures: Sequence[Path], options: PictureOptions | None = None, overlay_folder: Path | None = None
+    pictures: Sequence[Path],
+    options: PictureOptions | None = None,
+    overlay_folder: Path | None = None,
+    watch: Callable[[int], None] = lambda done: None,
 ) -> list[Row]:
     """Measure the repose angle of each picture, or file of spheres; a failed one does not affect the others.
 
     The overlay folder gets copies with the fitted flanks: ``NAME-angle.png`` for each picture, with its
-    folder's name where two have one name; for spheres also ``NAME-angle-clean.png``, without flanks.
+    folder's name where two have one name; for spheres also ``NAME-angle-clean.png``, without flanks. `watch`
+    is called with the number of measured pictures.
 
     Returns
     -------
@@ -122,24 +126,25 @@ def measure_pictures(
         it that was used), ``fit``, ``left``, ``right``, ``mean``, ``se``, the ends ``low`` and ``high`` of
         the 95 % interval, ``tilt`` and ``elevation`` of the camera [degrees], its ``distance`` [heap widths]
         where it is known, the ``plate``'s line (x1, y1, x2, y2) and the heap's width ``heap_pixels``
-        [pixels], all None for a failed one; ``doubts``, a list of sentences; ``overlay``, the drawn copy or
+        [pixels], all None for a failed one; ``correction``, the seen lines in words where the angles are
+        corrected for the camera's height; ``doubts``, a list of sentences; ``overlay``, the drawn copy or
         None; ``reason`` of a failure, else empty.
     """
     options = options or PictureOptions()
     FitSettings.of(options.fit)
     if overlay_folder and any(folder.is_file() for folder in (overlay_folder, *overlay_folder.parents)):
         raise InputError("--overlay", "must be a folder, not a file", str(overlay_folder))
-    names = drawn_names(pictures)
-    return [
-        _measured_row(picture, options, overlay_folder / name if overlay_folder else None)
-        for picture, name in zip(pictures, names, strict=True)
-    ]
+    rows = []
+    for picture, name in zip(pictures, drawn_names(pictures), strict=True):
+        rows.append(_measured_row(picture, options, overlay_folder / name if overlay_folder else None))
+        watch(len(rows))
+    return rows
 
 
 def _measured_row(picture: Path, options: PictureOptions, copy: Path | None) -> Row:
     row: Row = {"picture": str(picture), "source": "photograph", "fit": options.fit}
     row |= dict.fromkeys(ROW_VALUES)
-    row |= {"doubts": [], "overlay": None, "reason": ""}
+    row |= {"correction": "", "doubts": [], "overlay": None, "reason": ""}
     # A picture may break a decoder, memory or a fit in unexpected ways: that is the reason of its row.
     try:
         if is_heap_file(picture):
@@ -151,6 +156,7 @@ def _measured_row(picture: Path, options: PictureOptions, copy: Path | None) -> 
             require_known(picture)
             angle = measure_photograph(picture, options.fit, options.view)
             row |= _values(angle)
+            row["correction"] = angle.correction
             draw = partial(_drawn_photograph, picture, angle)
         if copy:
             clean = copy.with_name(f"{copy.stem}-clean.png")
@@ -282,7 +288,8 @@ def target_text(rows: Sequence[Mapping[str, Any]], options: PictureOptions) -> s
     sample, mean = target_sample(rows, options, "--target"), mean_angle(rows, options)
     used, left_out = (mean.pictures, len(mean.left_out)) if mean else (0, 0)
     return (
-        f"[target]  # {used} photographs, {options.fit} fit; left out as doubtful: {left_out}\n"
+        f"[target]  # {used} photographs; left out as doubtful: {left_out}\n"
+        f'fit = "{options.fit}"\n'
         f'mean = "{sample.mean:.3f} deg"\n'
         f'sd = "{sample.sd:.3f} deg"\n'
         f"n = {sample.n}\n"

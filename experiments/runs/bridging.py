@@ -47,6 +47,9 @@ class Bridge:
     crossing: Crossing
     """Shift, scale, the corrected point, and what fresh runs gave."""
 
+    def __str__(self) -> str:
+        return f"{self.crossing.reason} {self.card or self.folder}"
+
     @property
     def card(self) -> Path | None:
         """The corrected card; None where no point was found."""

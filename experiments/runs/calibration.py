@@ -14,6 +14,7 @@ from experiments.calibrate.results import Outcome, StageResult, TargetResult
 from experiments.calibrate.stages import StageHook
 from experiments.report import heap_pictures, verified_heap, write_report
 from experiments.report.study_companion import companion_of
+from experiments.report.verdict import verdict_sentence
 from experiments.runs.choices import Prepared, with_pictures
 from experiments.runs.run_folder import Run, open_run
 
@@ -26,6 +27,9 @@ class Calibration:
     """Folder of everything that it wrote."""
     campaign: Campaign
     """Results of every stage."""
+
+    def __str__(self) -> str:
+        return f"{verdict_sentence(self.campaign)} {self.report}"
 
     @property
     def report(self) -> Path:

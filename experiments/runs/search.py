@@ -58,6 +58,9 @@ class SearchResult:
     page: Path
     """The report, or the bank."""
 
+    def __str__(self) -> str:
+        return f"{self.verdict or 'The bank is made.'} {self.page}"
+
     @property
     def verdict(self) -> str:
         """The verdict in one line; empty where only the bank was made."""

@@ -27,7 +27,10 @@ SURFACE_PROFILE, OUTLINE_PROFILE = "surface", "outline"
 ANGLE = "angle"
 """Spelling of the repose angle in study files and tables of cases."""
 
-DIMENSIONS = {"1": "", "deg": "angle", "m": "length", "s": "time", "kg": "mass", "kg/s": "mass flow"}
+DIMENSIONS = {
+    "1": "", "deg": "angle", "m": "length", "s": "time",
+    "kg": "mass", "kg/s": "mass flow", "kg/m^3": "density",
+}  # fmt: skip
 """Dimension of each unit that an observable may have, as quantities know it."""
 
 
@@ -238,6 +241,16 @@ BY_NAME = {name: each for each in (*OBSERVABLES, *OUTLINE) for name in (each.nam
 PROFILES = {SURFACE_PROFILE: SURFACE, OUTLINE_PROFILE: tuple(each.name for each in OUTLINE)}
 """Heights of each profile that responses and files may ask for, by its name."""
 
+SOLID_FRACTION, BULK_DENSITY = "solid_fraction", "bulk_density"
+"""Observable of a filling, and the one that follows from it and the density of the grain."""
+_BULK_DENSITY = Observable(
+    BULK_DENSITY,
+    "bulk density",
+    "kg/m^3",
+    "mass of the grains over the volume of the container up to the surface",
+    Instrument.BALANCE,
+)
+
 OF_THE_RUN = ("grain_count", "simulated_time", "grains_lost", "clogged")
 """Observables about the simulation of a test, which nobody measures."""
 
@@ -258,11 +271,16 @@ VERSION = 2
 def observables_of(declared: Mapping[str, Declared], leaves_a_heap: bool) -> dict[str, Observable]:
     """Collect what a scene declares and what pictures of its heap show, by columns in a table of cases."""
     heap = {each.column: each for each in (*OBSERVABLES, *OUTLINE)} if leaves_a_heap else {}
-    return heap | {
-        name: Observable(name, name.replace("_", " "), unit, meaning)
-        for name, (unit, meaning) in declared.items()
-        if name not in heap
-    }
+    filling = {BULK_DENSITY: _BULK_DENSITY} if SOLID_FRACTION in declared else {}
+    return (
+        heap
+        | filling
+        | {
+            name: Observable(name, name.replace("_", " "), unit, meaning)
+            for name, (unit, meaning) in declared.items()
+            if name not in heap
+        }
+    )
 
 
 def measurable(

@@ -43,16 +43,22 @@ def overlay(picture: Picture | Snapshot, angle: ReposeAngle) -> Picture:
         _stroke(canvas, stroke, LINE_COLOR, 2.5 * unit)
         _label(canvas, stroke.mean(axis=0), degrees, aside, unit)
     if angle.doubts:
-        _mark(canvas, "doubtful: " + ", ".join(dict.fromkeys(doubt.name for doubt in angle.doubts)), unit)
+        text = "doubtful: " + ", ".join(dict.fromkeys(doubt.name for doubt in angle.doubts))
+        _mark(canvas, text, unit, DOUBT_COLOR, 0)
+    if angle.correction:
+        _mark(canvas, angle.correction, unit, PLATE_COLOR, 1)
     return canvas
 
 
-def _mark(canvas: Picture, text: str, unit: float) -> None:
-    """Write a line in the upper left corner, on a bar from border to border."""
+def _mark(canvas: Picture, text: str, unit: float, color: tuple[int, int, int], at_bottom: int) -> None:
+    """Write a line on a bar from border to border, at the top or at the bottom, as large as it fits."""
     size, weight = 0.7 * unit, max(1, round(1.4 * unit))
-    (_, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, weight)
-    cv2.rectangle(canvas, (0, 0), (canvas.shape[1], 2 * height), DOUBT_COLOR, -1)
-    origin = (height // 2, round(1.5 * height))
+    (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, weight)
+    share = min(1.0, (canvas.shape[1] - height) / width)
+    size, height = share * size, max(1, round(share * height))
+    top = at_bottom * (canvas.shape[0] - 2 * height)
+    cv2.rectangle(canvas, (0, top), (canvas.shape[1], top + 2 * height), color, -1)
+    origin = (height // 2, top + round(1.5 * height))
     cv2.putText(canvas, text, origin, cv2.FONT_HERSHEY_SIMPLEX, size, HALO_COLOR, weight, cv2.LINE_AA)
 
 

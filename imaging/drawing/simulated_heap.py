@@ -40,6 +40,9 @@ class HeapAngle:
     """Reasons why other azimuths could not be measured."""
     fit: FitSettings
 
+    def __str__(self) -> str:
+        return f"{self.mean:.2f} +- {self.se:.2f} degrees from {len(self.views)} sides"
+
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Return the confidence interval of the mean [degrees]."""
         return confidence_interval(self, level)

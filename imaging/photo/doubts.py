@@ -84,7 +84,8 @@ def doubts_of(
         if not LEAST_FOOT_SLOPE <= share <= 1.0 / LEAST_FOOT_SLOPE:
             finding = f"the {side} flank's lower third is {share:.2f} times as steep as the rest"
             limit = 1.0 / LEAST_FOOT_SLOPE
-            yield Doubt("foot", f"{finding}, beyond a factor of {limit:.2g}: a board, a shadow?")
+            cause = "few grains, a ragged edge?" if _is_ragged(line) else "a board, a shadow?"
+            yield Doubt("foot", f"{finding}, beyond a factor of {limit:.2g}: {cause}")
     short = foot_shortfall(left, right, outline)
     if short > LARGEST_SHORTFALL:
         finding = f"one foot ends {short:.2f} of the base earlier than the other"
@@ -130,6 +131,16 @@ def foot_slope(line: FlankLine, outline: Outline) -> float:
         for a, b in ((x[:third], h[:third]), (x[third:], h[third:]))
     )
     return low / high if high > 0.0 else 0.0
+
+
+def _is_ragged(line: FlankLine) -> bool:
+    """Return whether roughness alone may make a third of a flank as flat as `LEAST_FOOT_SLOPE`.
+
+    The slope of a third has 3 ** 1.5 times the standard error of the whole flank's.
+    """
+    turn = np.radians(line.angle)
+    relative = np.radians(line.se) / max(float(np.sin(turn) * np.cos(turn)), 1e-3)
+    return bool(2.0 * 3.0**1.5 * relative > 1.0 - LEAST_FOOT_SLOPE)
 
 
 def foot_shortfall(left: FlankLine, right: FlankLine, outline: Outline) -> float:

@@ -274,3 +274,16 @@ def test_the_lowest_row_of_grains_is_no_plate(shade: float) -> None:
 def test_a_board_hardly_wider_than_the_heap_is_refused() -> None:
     with pytest.raises(PictureError, match="narrow board"):
         measure(on_a_row((160, 90, 60)))
+
+
+def test_a_drawn_copy_says_where_its_lines_are_not_the_corrected_ones() -> None:
+    level, high = raised(34.0, 0.0), raised(34.0, 10.0)
+    view = View(distance=np.inf)
+    assert measure(level, view=view).correction == ""
+    angle = measure(high, view=view)
+    assert f"lines seen at {angle.left_line.angle:.1f} and" in angle.correction
+    assert f"{angle.left:.1f} and {angle.right:.1f} corrected" in angle.correction
+    drawn, plain = overlay(high, angle), overlay(level, measure(level, view=view))
+    assert (drawn[-3:, :3] != high[-3:, :3]).all(axis=2).all()
+    np.testing.assert_array_equal(plain[-3:, :3], level[-3:, :3])
+    assert len(str(angle)) < 100

@@ -1,9 +1,12 @@
 """Doubts about an angle, by outlines whose heap and board are known."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
+from drawn_heaps import Camera, DrawnHeap, draw
 
-from imaging import measure
+from imaging import PictureError, measure
 from imaging.flank.outline import Outline
 from imaging.flank.plate_line import PlateLine
 from imaging.photo.doubts import LARGEST_CLIFF, LARGEST_ERROR, ROUGH_EDGE, doubts_of, highest_cliff
@@ -84,3 +87,14 @@ def test_an_angle_is_doubted_before_another_look_is_taken(
     for limit, expected in ((LARGEST_ERROR, shown), (ROUGH_EDGE, looked)):
         found = doubts_of(angle.left_line, angle.right_line, angle.mean, se, seen, limit)
         assert [doubt.name for doubt in found] == expected
+
+
+def test_a_ragged_heap_of_few_grains_is_not_said_to_have_a_board_or_a_shadow() -> None:
+    """Grains of a seventh of the heap's width; the findings of all heaps whose foot is doubted."""
+    found = []
+    for seed in range(12):
+        picture = draw(DrawnHeap(28.0, 28.0, grain=60.0, seed=seed), Camera(noise=2, seed=seed))
+        with suppress(PictureError):
+            found += [str(each) for each in measure(picture).doubts if "lower third" in each.finding]
+    assert len(found) > 3
+    assert all("few grains" in finding and "board" not in finding for finding in found)

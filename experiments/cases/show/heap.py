@@ -7,7 +7,7 @@ import math
 import shutil
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from experiments.cases.workers.workers import Workers
 from experiments.io.errors import InputError
 from experiments.io.files import replacing, write_text
 from experiments.io.program_version import with_version
-from experiments.measurement.case_observables import Observed, observe
+from experiments.measurement.case_observables import Observed, observe, with_bulk_density
 from experiments.measurement.filling import filling_reached
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
@@ -50,6 +50,9 @@ class Heap:
     """Name of its scene."""
     film: Film | None = None
     """Frames of its course, if they were asked for and it could begin."""
+
+    def __str__(self) -> str:
+        return str(self.angle) if self.angle else f"{self.result.status}: {self.reason or 'no heap'}"
 
     @property
     def angle(self) -> HeapAngle | None:
@@ -128,6 +131,7 @@ def simulate_heap(
         result, film = simulate_frames(case, frames, filmed_by(workers).name, progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
     observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
+    observed = replace(observed, observables=with_bulk_density(observed.observables, case))
     return Heap(study, values, seed, result, observed, scene, film)
 
 

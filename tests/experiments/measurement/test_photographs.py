@@ -1,11 +1,12 @@
 """Measured pictures: one row for each, names of copies, and means over heaps."""
 
+import tomllib
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from commandline import refused
+from commandline import dem_warp, refused
 from drawn_heaps import Camera, DrawnHeap, draw
 
 from experiments.measurement import photographs
@@ -101,3 +102,26 @@ def test_rows_have_the_tilt_and_the_plate(tmp_path: Path) -> None:
     x1, y1, x2, y2 = measured["plate"]
     assert np.degrees(np.arctan2(y2 - y1, x2 - x1)) == pytest.approx(measured["tilt"])
     assert measured["heap_pixels"] == pytest.approx(400, abs=6)
+
+
+def test_a_target_has_its_fit_as_a_key_and_doubts_are_printed_without_one(tmp_path: Path) -> None:
+    for number, slope in enumerate((27.0, 29.0)):
+        save_picture(tmp_path / f"heap-{number}.png", draw(DrawnHeap(slope, slope), Camera(noise=0)))
+    code, out, _ = dem_warp("angle", *sorted(tmp_path.glob("heap-*.png")), "--target", "--fit", "middle")
+    assert code == 0
+    assert tomllib.loads(out)["target"]["fit"] == "middle"
+    for number in range(2):
+        save_picture(
+            tmp_path / f"leaning-{number}.png", draw(DrawnHeap(22.0, 33.0 + number), Camera(noise=0))
+        )
+    err = refused("angle", *sorted(tmp_path.glob("leaning-*.png")), "--target")
+    assert "needs two measured heaps" in err
+    assert err.count("Doubtful:") == 2
+
+
+def test_many_pictures_show_their_progress(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = save_picture(tmp_path / "heap.png", draw(DrawnHeap(30.0, 30.0), Camera(noise=0)))
+    clock = iter(range(0, 1000, 60))
+    monkeypatch.setattr("experiments.commands.console.time.monotonic", lambda: next(clock))
+    _, _, err = dem_warp("angle", *[picture] * 4, "--json")
+    assert "pictures: 1 of 4, 3 min 0 s left" in " ".join(err.split())

@@ -55,6 +55,9 @@ def test_heap_and_bin_are_simulated_together(study: Study, tmp_path: Path) -> No
     assert math.isnan(outflow["angle"])
     assert outflow["reason"] == "", "a bin leaves no heap, and its measurement did not fail"
     assert 0.0 < outflow["discharge_time"] < outflow["simulated_time"]
+    density = study.case({"E": 0.4}, 1).grain_material.density
+    for row in (heap, outflow):
+        assert row["bulk_density"] == pytest.approx(density * row["solid_fraction"], rel=1e-12)
     assert outflow["filled_mass"] == pytest.approx(outflow["fallen_mass"] + outflow["mass_left"], rel=1e-6)
 
 
@@ -64,6 +67,8 @@ def test_one_case_of_a_further_scene_is_shown_alone(study: Study, tmp_path: Path
     found = json.loads(shown)
     assert (code, found["scene"], found["angle"]) == (0, "bin", None)
     assert found["observable_units"]["discharge_time"] == "s"
+    assert found["observable_units"]["bulk_density"] == "kg/m^3"
+    assert found["observables"]["bulk_density"] > found["observables"]["solid_fraction"]
     assert "did you mean 'bin'" in refused(*words, tmp_path / "other", "--scene", "bim")
     assert not (tmp_path / "other").exists()
 

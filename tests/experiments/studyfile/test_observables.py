@@ -79,7 +79,7 @@ def test_a_campaign_is_given_the_same_values_as_a_search(cone: Cone) -> None:
 def test_observables_of_a_scene_have_one_definition_each() -> None:
     named = LiftedCylinder.observables
     known = observables_of(named, leaves_a_heap=True)
-    assert set(known) == set(named) | {each.column for each in (*OBSERVABLES, *OUTLINE)}
+    assert set(known) == {*named, "bulk_density"} | {each.column for each in (*OBSERVABLES, *OUTLINE)}
     for name, (unit, meaning) in named.items():
         assert known[name].unit == unit
         assert known[name].definition.startswith(meaning)

@@ -64,6 +64,15 @@ def test_responses_are_read_in_si_with_their_scenes(write_study: WriteStudy) -> 
     assert list(study.scenes) == ["target", "bin", "short"]
 
 
+def test_a_bulk_density_is_an_observable_with_its_unit(write_study: WriteStudy) -> None:
+    bulk = '[[response]]\nobservable = "bulk_density"\nmean = "0.42 g/cm^3"\nsd = "4 kg/m^3"\nn = 4\n'
+    response = load_study(write_study(add=bulk)).target.responses[1]
+    assert (response.observable, response.unit) == ("bulk_density", "kg/m^3")
+    assert (response.measured.mean, response.measured.sd) == pytest.approx((420.0, 4.0))
+    with pytest.raises(StudyError, match="unit of density"):
+        load_study(write_study(add=bulk.replace("0.42 g/cm^3", "0.42")))
+
+
 def test_a_twin_needs_no_measurements_of_its_responses(write_study: WriteStudy) -> None:
     path = write_study(add=f'{TWIN}[[response]]\nobservable = "fill_height"\n')
     responses = (Response("angle", "angle", "deg"), Response("fill_height", "fill_height", "m"))
