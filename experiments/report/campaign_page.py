@@ -13,7 +13,7 @@ from experiments.report.paper_text import pastes
 from experiments.report.pictures import HeapPicture
 from experiments.report.sections import TITLES, Context, chapter, failed_chapter, stage_chapters
 from experiments.report.solid import SolidHeap
-from experiments.report.stage_tables import values_table
+from experiments.report.stage_tables import fixed_table, values_table
 from experiments.report.study_companion import companion_of
 from experiments.report.study_facts import study_facts
 from experiments.report.verdict import HEADLINES, headline, verdict_sentence
@@ -37,7 +37,7 @@ def render_page(
     chapters += stage_chapters(context)
     values = None
     if campaign.optimum is not None:
-        values = values_table(campaign, campaign.optimum, labels)
+        values = values_table(campaign, campaign.optimum, study)
         chapters += [other_codes_chapter(study, campaign.optimum), chapter("paper_text")]
     chapters.append(failed_chapter(campaign))
     chapters += [*companion_of(study).campaign_chapters(campaign), chapter("provenance")]
@@ -48,6 +48,7 @@ def render_page(
         "sentence": verdict_sentence(campaign),
         "cautions": cautions(campaign, study),
         "values": values,
+        "fixed": fixed_table(study, campaign.optimum) if campaign.optimum else None,
         "pastes": pastes(campaign, study, provenance or {}),
         "solid": solid,
         "calibrated": headline(campaign) == HEADLINES[Outcome.CALIBRATED],

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,12 +22,17 @@ from experiments.calibrate.results import (
 from experiments.report.kit.numbers import open_end, unit_sign
 from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
+from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE, Response
+from experiments.studyfile.factor_section import with_factor_values
 
 SIGNIFICANT = 0.05
 """Rows of an analysis of variance with p below this are marked."""
 
 ERROR_PERCENT = Column("error_percent", "relative error", "ratio", "%")
+ENTERED = ("grain", "wall", "walls", "contact", "mechanism")
+"""Sections of a study whose values a person enters in another code."""
+
 QUALITY = {
     "r2": "R²",
     "r2_adjusted": "R² adjusted",
@@ -212,17 +218,17 @@ def quality_table(result: FittedResponse) -> Table:
     return make_table("quality", frame, shown, "Quality of the fits.")
 
 
-def values_table(campaign: Campaign, optimum: OptimumResult, labels: Mapping[str, str]) -> Table:
+def values_table(campaign: Campaign, optimum: OptimumResult, study: Study) -> Table:
     """Lay out the value of every factor, with the values that are as good where it was calibrated."""
     region, chosen = optimum.region, optimum.point
     frame = pd.DataFrame(
         {
-            "label": labels,
+            "label": study.labels,
             "value": optimum.settings,
             "unit": {factor.name: factor.unit for factor in campaign.factors},
             "low": region.ranges["low"],
             "high": region.ranges["high"],
-            "how": {name: _how(name, optimum) for name in optimum.settings},
+            "how": {name: _how(name, optimum, study) for name in optimum.settings},
         }
     ).rename_axis("factor")
     for end, opened in region.open_ends.items():
@@ -242,10 +248,41 @@ def values_table(campaign: Campaign, optimum: OptimumResult, labels: Mapping[str
     return make_table("values", frame, shown, caption, say("note.values") if len(chosen) > 1 else "", marks)
 
 
-def _how(name: str, optimum: OptimumResult) -> str:
-    if name not in optimum.point:
-        return "middle of its range"
-    return "calibrated, left open" if name in optimum.unidentified else "calibrated"
+def fixed_table(study: Study, optimum: OptimumResult) -> Table:
+    """Lay out all else that a code must be given: what the study fixes, with the modulus as simulated."""
+    chosen = with_factor_values(study.document, study.factor_sections, optimum.settings)
+    varied = {place for section in study.factor_sections for place in section.parameter}
+    case = study.case(optimum.settings, 1)
+    moduli = {"grain": case.grain_material.shear_modulus, "wall": study.wall.shear_modulus}
+    rows = [
+        {"what": place.replace(".", ", ").replace("_", " "), "value": str(value), "note": ""}
+        for place, value in leaves({key: chosen[key] for key in ENTERED if key in chosen})
+        if place not in varied and not place.endswith("shear_modulus")
+    ]
+    scale = study.numerics.modulus_scale
+    for name, modulus in moduli.items():
+        note = f"as simulated: divided by {scale:g}; keep it" if name == "grain" and scale != 1.0 else ""
+        rows.append({"what": f"{name}, shear modulus", "value": f"{modulus:.12g} Pa", "note": note})
+    rows.append({"what": "contact laws", "value": study.solver.laws.name, "note": "see what was simulated"})
+    heads = columns(what="what the study fixes", value="value", note="note")
+    return make_table("fixed-values", pd.DataFrame(rows), heads, "All else that the values hold with.")
+
+
+def leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values of nested tables with their dotted places."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _how(name: str, optimum: OptimumResult, study: Study) -> str:
+    how = "calibrated" if name in optimum.point else "middle of its range"
+    how += ", left open" if name in optimum.unidentified else ""
+    scale, sections = study.numerics.modulus_scale, {each.name: each for each in study.factor_sections}
+    softened = scale != 1.0 and "grain.shear_modulus" in sections[name].parameter
+    return how + (f"; enter it divided by {scale:g}, as simulated" if softened else "")
 
 
 def differences_table(

@@ -8,8 +8,10 @@ from types import SimpleNamespace
 
 import pytest
 from analytic_heaps import AnalyticHeaps, study_with
+from page_reader import Page
 
 from experiments.calibrate import Campaign, calibrate
+from experiments.report import render_page
 from experiments.report.cautions import FEW_GRAINS, cautions
 from experiments.report.kit.latex import latex_text
 from experiments.report.kit.numbers import prose
@@ -101,6 +103,19 @@ def test_the_values_to_enter_are_those_of_every_factor(campaign: Campaign, study
     assert rows["E"][5][0].endswith(", not explored beyond")
     assert (rows["E"][-1][0], rows["A"][-1][0]) == ("calibrated, left open", "middle of its range")
     assert rows["A"][4][1] is None
+
+
+def test_the_values_to_enter_hold_the_fixed_ones_and_the_simulated_modulus() -> None:
+    study = study_with(load_study(None, "bench"), selection={"keep": ("E", "F")})
+    page = Page(render_page(calibrate(study, AnalyticHeaps()), study))
+    rows = {row[0][0]: row for row in page.rows("fixed-values")}
+    case = study.case({}, 1)
+    assert float(rows["grain, shear modulus"][1][0].removesuffix(" Pa")) == case.grain_material.shear_modulus
+    assert f"divided by {study.numerics.modulus_scale:g}" in rows["grain, shear modulus"][2][0]
+    assert rows["grain, density"][1][0] == "698 kg/m^3"
+    assert {"wall, poisson ratio", "wall, density", "contact laws", "grain, size sd"} <= set(rows)
+    [modulus] = [row for row in page.rows("values") if row[1][0] == "B"]
+    assert modulus[-1][0].endswith(f"enter it divided by {study.numerics.modulus_scale:g}, as simulated")
 
 
 def test_the_paragraph_says_what_a_referee_asks(campaign: Campaign, study: Study) -> None:
