@@ -97,7 +97,10 @@ def doubts_of(
     flattest = min(step_slope(line, outline) for line in (left, right))
     if flattest < LEAST_STEP_SLOPE:
         finding = f"a part of a flank is {max(flattest, 0.0):.2f} times as steep as its line"
-        yield Doubt("step", f"{finding}, under {LEAST_STEP_SLOPE:g}: the top of a board?")
+        cause = (
+            "few grains, a ragged edge?" if _is_ragged(left) or _is_ragged(right) else "the top of a board?"
+        )
+        yield Doubt("step", f"{finding}, under {LEAST_STEP_SLOPE:g}: {cause}")
     end = highest_end(outline)
     if end > LARGEST_END and end * outline.height.max() > LEAST_END:
         finding = f"an end is {end:.2f} heights over the plate, over {LARGEST_END:g}"

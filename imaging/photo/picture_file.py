@@ -21,6 +21,8 @@ LARGEST_FILE = 500_000_000
 """Size of the largest file that is read [bytes]."""
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 HEIC_ENDINGS = (".heic", ".heif")
+HEIC_BRANDS = (b"ftypheic", b"ftypheix", b"ftypmif1", b"ftyphevc")
+"""Bytes 4 to 12 of a HEIC file."""
 RAW_ENDINGS = (
     ".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dcr", ".dng", ".erf", ".iiq", ".kdc", ".mef", ".mos", ".mrw",
     ".nef", ".nrw", ".orf", ".pef", ".raf", ".raw", ".rw2", ".rwl", ".sr2", ".srf", ".srw", ".x3f",
@@ -53,7 +55,7 @@ def read_picture(path: str | Path) -> Picture:
         if os.path.isdir(file):
             problem = "is a folder: name the files in it, e.g. FOLDER/*.jpg"
         raise PictureError(str(path), problem)
-    if file.suffix.lower() in HEIC_ENDINGS:
+    if file.suffix.lower() in HEIC_ENDINGS or _is_heic(file):
         return _read_heic(file)
     if file.suffix.lower() in RAW_ENDINGS:
         raise _raw(file)
@@ -70,7 +72,10 @@ def read_picture(path: str | Path) -> Picture:
         with suppress(cv2.error):
             picture = _decoded(np.frombuffer(content, dtype=np.uint8))
     if picture is None:
-        raise PictureError(str(path), f"the picture is damaged or cut off ({length} bytes)")
+        problem = "the picture is damaged or cut off"
+        if not cv2.haveImageReader(str(file)):
+            problem = "a picture in a format that is not read here: save it as PNG or JPEG"
+        raise PictureError(str(path), f"{problem} ({length} bytes)")
     return picture.astype(np.uint8, copy=False)
 
 
@@ -82,6 +87,12 @@ def _decoded(content: Picture) -> Any:
     if deep is None or bits == 16:
         return cv2.imdecode(content, cv2.IMREAD_COLOR)
     return (deep >> (bits - 8)).astype(np.uint8)
+
+
+def _is_heic(file: Path) -> bool:
+    """Return whether a file is HEIC by its content: phones' pictures are often renamed to .jpg."""
+    with file.open("rb") as opened:
+        return opened.read(12)[4:] in HEIC_BRANDS
 
 
 def _read_heic(file: Path) -> Picture:

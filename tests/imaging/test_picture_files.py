@@ -38,8 +38,10 @@ def test_a_picture_that_claims_too_many_pixels_is_not_decoded(tmp_path: Path, si
 def test_heic_without_its_package_says_how_to_convert(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "pillow_heif", None)
     (tmp_path / "phone.HEIC").write_bytes(b"ftypheic")
-    with pytest.raises(PictureError, match=r"dem-warp\[heic\].*save the picture as JPEG"):
-        read_picture(tmp_path / "phone.HEIC")
+    (tmp_path / "renamed.jpg").write_bytes(b"\0\0\0\x18ftypheic\0\0\0\0")
+    for name in ("phone.HEIC", "renamed.jpg"):
+        with pytest.raises(PictureError, match=r"dem-warp\[heic\].*save the picture as JPEG"):
+            read_picture(tmp_path / name)
 
 
 def test_heic_is_read_as_blue_green_red(tmp_path: Path, monkeypatch) -> None:
@@ -112,3 +114,6 @@ def test_a_file_that_is_no_picture_is_not_called_one(tmp_path: Path, content: by
     cut.write_bytes(cut.read_bytes()[:60])
     with pytest.raises(PictureError, match="damaged or cut off"):
         read_picture(cut)
+    Image.fromarray(draw(DrawnHeap(30, 30))).save(tmp_path / "heap.pcx")
+    with pytest.raises(PictureError, match="in a format that is not read here: save it as PNG"):
+        read_picture(tmp_path / "heap.pcx")
