@@ -16,6 +16,8 @@ from .scenes.drum import Drum
 from .scenes.hopper import Hopper
 from .scenes.library import SCENES
 from .scenes.lifted_cylinder import LiftedCylinder
+from .scenes.poured_controller import PouredController
+from .scenes.poured_scene import PouredScene
 from .simulation import simulate
 from .version import __version__
 
@@ -41,6 +43,8 @@ __all__ = [
     "Mechanism",
     "Numerics",
     "Parameter",
+    "PouredController",
+    "PouredScene",
     "Processes",
     "Progress",
     "ShapeMixture",

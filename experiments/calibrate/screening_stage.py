@@ -11,13 +11,21 @@ from doe import Design, DesignError, Factor, ScreenResult, plackett_burman, scre
 from experiments.calibrate.cases import failure_summary, measured, plan_cases, response_table, too_many_failed
 from experiments.calibrate.results import Decision, Screened, ScreeningResult
 from experiments.calibrate.values import key_of, p_text, quantity
+from experiments.io.errors import InputError
+from experiments.io.plug_ins import made_in
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response, ScreeningSettings
 
 STAGE = "screening"
 
+
+def _check(name: str, design: object, known: object) -> None:
+    if not callable(design):
+        raise TypeError(f"must be a function of factors and a number of runs, got {design!r}")
+
+
 DESIGNS: Registry[Callable[[Sequence[Factor], int], Design]] = Registry(
-    "dem_warp.designs", {"plackett-burman": plackett_burman}
+    "dem_warp.designs", {"plackett-burman": plackett_burman}, _check
 )
 """Screening designs of two levels by name, each made for some factors in a number of runs."""
 
@@ -30,7 +38,11 @@ def screening_design(factors: Sequence[Factor], settings: ScreeningSettings) -> 
     if settings.design not in DESIGNS:
         raise ValueError(f"design must be one of {', '.join(DESIGNS)}, got {settings.design!r}")
     fewest = max(LEAST_RUNS, 4 * -(-(len(factors) + settings.dummies + 1) // 4))
-    return DESIGNS[settings.design](factors, settings.runs or fewest)
+    design = DESIGNS[settings.design](factors, settings.runs or fewest)
+    if not isinstance(design, Design):
+        made = made_in(DESIGNS[settings.design])
+        raise InputError("campaign.screening.design", f"{made} must return a doe.Design", design)
+    return design
 
 
 def plan_screening(study: Study, design: Design) -> pd.DataFrame:

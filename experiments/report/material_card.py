@@ -11,6 +11,7 @@ import numpy as np
 from doe import Region, Sample
 from experiments.calibrate.results import Campaign, OptimumResult
 from experiments.io.files import write_text
+from experiments.io.plug_ins import plug_in_versions
 from experiments.io.toml_files import toml_text
 from experiments.report.clump_files import gather_clumps
 from experiments.studyfile import Study
@@ -18,6 +19,7 @@ from experiments.studyfile.campaign import Response
 from experiments.studyfile.card import MATERIAL, SECTIONS
 from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
+from experiments.studyfile.manifest import PLUG_INS
 from experiments.studyfile.solver_section import CORRECTED_FOR, LAWS, SolverSection, written
 
 CARD = "material.toml"
@@ -81,6 +83,8 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
     }
     if study.engine is not None:
         facts["engine"] = study.engine.name or study.engine.command
+    if added := plug_in_versions():
+        facts[PLUG_INS] = added
     if study.walls:
         facts["walls"] = {name: part.model_dump(exclude_none=True) for name, part in study.walls.items()}
     scenes, document = {response.scene for response in campaign.responses}, study.document

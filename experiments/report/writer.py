@@ -14,6 +14,7 @@ import pandas as pd
 from experiments.calibrate.results import Campaign
 from experiments.io.files import write_text
 from experiments.io.plain_data import jsonable
+from experiments.io.plug_ins import plug_in_versions
 from experiments.io.program_version import program_version
 from experiments.io.texts import safe_cell
 from experiments.report.campaign_page import render_page
@@ -78,6 +79,6 @@ def _csv_text(table: pd.DataFrame) -> str:
 
 
 def library_versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that the numbers depend on."""
+    """Return the versions of Python and of the packages that the numbers depend on, plug-ins too."""
     own = {"dem-warp": program_version(), "python": platform.python_version()}
-    return own | {name: version(name) for name in LIBRARIES}
+    return own | {name: version(name) for name in LIBRARIES} | plug_in_versions()

@@ -32,6 +32,7 @@ from experiments.cases.forecast.speed import UNKNOWN, noted_speed, source_of
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.resources import PROCESS_BYTES
 from experiments.cases.workers.submissions import submit_command
+from experiments.io.plug_ins import plug_ins
 from experiments.io.program_version import program_version
 from experiments.runs.choices import BENCH, PAPER
 from experiments.studyfile import load_study
@@ -70,6 +71,7 @@ def examine(resources: Resources, cache: Finding) -> list[Finding]:
     versions = f"dem-warp {program_version()}, Warp {wp.__version__}, Python {platform.python_version()}"
     return [
         Finding("versions", True, versions),
+        *(Finding("plug-in", True, str(each)) for each in plug_ins()),
         *_tried("GPU", _gpus),
         *_tried("cores", _cores),
         *_tried("memory", lambda: [_memory(resources)]),

@@ -7,7 +7,6 @@ from typing import Self
 
 from pydantic import Field, field_validator, model_validator
 
-from experiments.studyfile.observables import BY_NAME
 from experiments.studyfile.schema import Section, Time
 
 
@@ -35,14 +34,6 @@ class EngineSection(Section):
         if command is not None and not words_of(command):
             raise ValueError("must name a program")
         return command
-
-    @field_validator("observables")
-    @classmethod
-    def _are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        if unknown := [name for name in names if name not in BY_NAME or BY_NAME[name].by_photograph]:
-            known = ", ".join(dict.fromkeys(each.name for each in BY_NAME.values() if not each.by_photograph))
-            raise ValueError(f"must be of {known}, as the heap shows the others, got {', '.join(unknown)}")
-        return names
 
     @model_validator(mode="after")
     def _is_one(self) -> Self:

@@ -9,19 +9,24 @@ from typing import Any
 
 from experiments.io.errors import StoreError
 from experiments.io.files import read_file, write_text
+from experiments.io.plug_ins import plug_in_versions
 from experiments.studyfile.places import KeyPath, dotted
 from experiments.studyfile.study import Study
 
 MANIFEST = "study.json"
 """File that says which study the folder belongs to."""
 
+PLUG_INS = "plug-ins"
+"""Key of the versions of the plug-ins that were installed; they do not make it another study."""
+
 LARGEST = 10_000_000
 """Bytes of the largest file of this kind that is read."""
 
 
 def write_manifest(folder: Path, study: Study) -> None:
-    """Write the file with the study of the folder."""
-    write_text(folder / MANIFEST, json.dumps(study.identity, indent=1, allow_nan=False))
+    """Write the file with the study of the folder, and the installed plug-ins."""
+    added = {PLUG_INS: plug_in_versions()} if plug_in_versions() else {}
+    write_text(folder / MANIFEST, json.dumps(study.identity | added, indent=1, allow_nan=False))
 
 
 def differences(old: object, new: object, path: KeyPath = ()) -> Iterator[str]:
@@ -41,11 +46,12 @@ def _shown(value: object) -> str:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read what `write_manifest` wrote; StoreError where it cannot be read."""
+    """Read the study that `write_manifest` wrote, without plug-ins; StoreError where it cannot be read."""
     path = folder / MANIFEST
     try:
         manifest: dict[str, Any] = json.loads(read_file(path, LARGEST))
+        manifest.pop(PLUG_INS, None)
         return manifest
-    except (OSError, ValueError, RecursionError):
+    except (OSError, ValueError, RecursionError, AttributeError, TypeError):
         hint = "Only a folder with the file that a run has written can be resumed."
         raise StoreError(str(path), "cannot be read", hint=hint) from None

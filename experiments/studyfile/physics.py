@@ -12,10 +12,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, ShapeMixture, WallPart
+from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, PouredScene, ShapeMixture, WallPart
 from dem_warp.laws.mechanism import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
-from dem_warp.scenes.poured_scene import PouredScene, TooManyGrainsError
+from dem_warp.scenes.poured_scene import TooManyGrainsError
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.proportions import narrowness

@@ -7,8 +7,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import model_validator
 
-from dem_warp import SCENES, Material
-from dem_warp.scenes.poured_scene import PouredScene
+from dem_warp import SCENES, Material, PouredScene
 from dem_warp.scenes.scene import Observable
 from experiments.studyfile.generated import EngineSection, LibrarySection, library_section
 

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ design = "corners"
 [campaign.selection]
 at_least = 1  # two corners have no noise to compare an effect with
 """
+MAGNETS = {"grain-magnets": "1.0"}
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
 JAR = '[scene.jar]\ndiameter = "12 mm"\nheight = "20 mm"\ngrain_count = 10\n'
 
@@ -99,6 +101,12 @@ def test_a_scene_is_simulated(plugged: Installed) -> None:
     assert 1e-3 < heap["observables"]["fill_height"] < 6e-3
 
 
+def test_doctor_lists_the_package_and_its_entries(plugged: Installed) -> None:
+    found = json.loads(plugged.dem_warp("doctor", "--json"))
+    [listed] = (each["text"] for each in found if each["name"] == "plug-in")
+    assert listed.startswith("grain-magnets 1.0 (designs: corners; engines: cones; exporters: leaflet; ")
+
+
 def test_a_study_is_exported(plugged: Installed) -> None:
     (plugged.work / "leaves.toml").write_text(SMALL, encoding="utf-8")
     plugged.dem_warp("export", "leaves.toml", "--to", "leaflet", "--approximate", "--out", "leaflet")
@@ -114,5 +122,12 @@ def test_a_campaign_runs_with_its_design_on_its_engine(plugged: Installed) -> No
     assert found["optimum"]["point"]["E"] == pytest.approx(0.5, abs=0.02)
     results = json.loads((plugged.work / "out" / "results.json").read_text(encoding="utf-8"))
     assert results["provenance"]["engine"] == {"engine": "cones"}
+    # what made the results is with them, and in the card
+    assert results["provenance"]["versions"]["grain-magnets"] == "1.0"
+    assert json.loads((plugged.work / "out" / "study.json").read_text("utf-8"))["plug-ins"] == MAGNETS
+    card = tomllib.loads((plugged.work / "out" / "material.toml").read_text(encoding="utf-8"))
+    assert card["fitted"]["plug-ins"] == MAGNETS
+    plugged.dem_warp(*words, "--resume")
+    plugged.dem_warp("export", "out/material.toml", "--to", "leaflet", "--approximate", "--out", "card")
     design = pd.read_csv(plugged.work / "out" / "tables" / "screening_design.csv")
     assert design["E"].tolist() == [-1.0, 1.0] * 4

@@ -183,8 +183,10 @@ def _from_the_others(measured: Measured, emulator: Emulator, condition: str) -> 
         for row in present:
             others = rows[present[present != row], column]
             sd = np.sqrt(max(own, others.var(ddof=1)) * (1.0 + 1.0 / len(others)))
-            ratios[row, column] = rows[row, column] / others.mean()
-            away[row, column] = abs(rows[row, column] - others.mean()) / sd
+            mean, value = others.mean(), rows[row, column]
+            ratios[row, column] = value / mean if mean else np.nan
+            # values that never vary: an equal one is at no distance, another at any
+            away[row, column] = abs(value - mean) / sd if sd else (0.0 if value == mean else np.inf)
     return ratios, away
 
 

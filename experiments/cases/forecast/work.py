@@ -6,9 +6,8 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
-from dem_warp import Case
+from dem_warp import Case, PouredScene
 from dem_warp.device import resolve_device
-from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.solver import CHUNK
 
 BULK_FRACTION = 0.55

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.workers.batches import relative_work
+from experiments.io.errors import InputError
+from experiments.io.plug_ins import made_in
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,24 @@ class ExpectedProgress(Progress):
 
     expected: float | None = None
     """Wall time of the call, predicted before it began [s]; None if it could not be."""
+
+
+def checked_result(case: Case, result: CaseResult) -> CaseResult:
+    """Return a result, failed where its scene or its engine gave a number that is not finite.
+
+    Raise InputError for what is not a result.
+    """
+    if not isinstance(result, CaseResult):
+        raise InputError("engine", "must hand on a dem_warp.CaseResult for each case", result)
+    wrong = [f"{name} = {value}" for name, value in result.observables.items() if not math.isfinite(value)]
+    if result.positions.size and not np.isfinite(result.positions).all():
+        wrong.append("positions that are not finite")
+    if result.status != "finished" or not wrong:
+        return result
+    source = result.provenance.get("engine") or made_in(type(case.scene))
+    kept = {name: value for name, value in result.observables.items() if math.isfinite(value)}
+    reason = f"{source} returned {', '.join(wrong)}"
+    return replace(result, status="failed", reason=reason, observables=kept)
 
 
 class CallResults:
@@ -42,6 +63,7 @@ class CallResults:
         on_progress: OnProgress | None,
         expected: float | None = None,
     ) -> None:
+        self._cases = cases
         self.costs = relative_work(cases)
         """Predicted work of each case, (n,)."""
         self.results: dict[int, CaseResult] = {}
@@ -81,10 +103,18 @@ class CallResults:
         """Take the result of a case, and hand it on."""
         if index in self.results:
             return
+        result = checked_result(self._cases[index], result)
         self.results[index] = result
         self._fractions[index] = 1.0
         if self._on_result is not None:
             self._call(self._on_result, index, result)
+
+    def take_all(self, members: Sequence[int], results: object) -> None:
+        """Take what an engine returned for the members of a batch; InputError for another number."""
+        if not isinstance(results, list) or len(results) != len(members):
+            raise InputError("engine", f"must return a list of {len(members)} results", results)
+        for index, result in zip(members, results, strict=True):
+            self.take(index, result)
 
     def follow(self, batch: int, members: Sequence[int], progress: Progress) -> None:
         """Take the progress of some members of a batch, and report that of all."""

@@ -104,13 +104,15 @@ class OwnWorkers:
             own = partial(simulate, on_advance=self.on_advance, checkpoint_every=every)
             processes = self.processes or self.workers
             simulator = partial(engine, workers=self.workers) if engine else partial(own, workers=processes)
-            simulator(
+            answers = simulator(
                 [cases[index] for index in members],
                 device=self.name,
                 on_result=lambda number, result: results.take(members[number], result),
                 on_progress=partial(results.follow, batch, members),
                 checkpoint=checkpoint,
             )
+            if engine:  # one that does not call on_result
+                results.take_all(members, answers)
 
         for number, batch in enumerate(self._batches(cases, results, engine)):
             run_divided(results, batch, partial(run, number))

@@ -12,9 +12,10 @@ from experiments.calibrate import case_seed
 from experiments.calibrate.cases import plan_cases, response_table, too_many_failed
 from experiments.calibrate.climb_stage import _Line
 from experiments.calibrate.results import STAGES
-from experiments.calibrate.screening_stage import analyse_screening, screening_design
+from experiments.calibrate.screening_stage import DESIGNS, analyse_screening, screening_design
 from experiments.calibrate.surface_stage import fit_inside
 from experiments.calibrate.target_stage import plan_target
+from experiments.io.errors import InputError
 from experiments.studyfile.campaign import (
     TARGET_SCENE,
     CampaignSettings,
@@ -30,6 +31,14 @@ ANGLE = Response("angle", "angle", "deg")
 
 def factors(count: int) -> list[Factor]:
     return [Factor(f"x{number}", 0.0, 1.0) for number in range(count)]
+
+
+def test_a_design_that_returns_another_thing_is_named_with_its_module(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(DESIGNS, "_outside", {"odd": lambda factors, runs: None})
+    with pytest.raises(InputError, match=r"test_calibrate_stages must return a doe.Design, got None"):
+        screening_design(factors(2), ScreeningSettings(design="odd"))
 
 
 def slope_of(factor: Factor) -> tuple[Design, pd.DataFrame]:

@@ -93,3 +93,12 @@ def test_effects_are_no_slips() -> None:
 def test_valid_data_have_no_slips() -> None:
     # An outlier of eight standard deviations in 480 values: never.
     assert all(find_slips(heaps(seed), KNOWN, SEARCH.settings) == () for seed in range(4))
+
+
+def test_an_observable_that_is_zero_in_all_heaps_is_no_factor_of_another() -> None:
+    measured = heaps(3)
+    for rows in measured.values.values():
+        rows[:, measured.observables.index("height")] = 0.0
+    # no warning of a division (pytest makes it an error), and no factor that 0 could be typed by
+    found = find_slips(measured, KNOWN, SEARCH.settings)
+    assert all(slip.factor is None for slip in found if "height" in slip.observables)

@@ -90,8 +90,11 @@ HOSTILE = {
     "true for a count": study("heap", "= 30", "= true", "grain_count", "not true or false", "True"),
     "NaN": study("heap", "restitution = 0.2", "restitution = nan", "restitution", "finite", "nan"),
     "narrow tube": study("heap", '"28 mm"\nheight', '"7 mm"\nheight', "scene", "2 grains wide", "7 mm"),
+    "a long text": study(
+        "heap", 'name = "Small"', f'nome = "{"x" * 400_000}"', "nome", "unknown key"
+    ),
     "two megabytes": study(
-        "heap", 'name = "Small"', f'nome = "{"x" * 2_000_000}"', "nome", "unknown key"
+        "heap", 'name = "Small"', f'name = "{"x" * 2_000_000}"', "s.toml", "at most 500,000 bytes"
     ),
     "escape sequences": study("heap", 'name = "Small"', 'nome = "\\u001b[2J"', "nome", "unknown key"),
     "an unknown key": study("heap", "n = 5", "n = 5\nm = 6", "s.toml:40: target.m", "unknown key"),

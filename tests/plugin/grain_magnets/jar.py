@@ -4,10 +4,8 @@ from dataclasses import dataclass
 from math import pi
 from typing import Annotated, Any, ClassVar
 
-from dem_warp.materials import Material
-from dem_warp.parameters import Parameter
-from dem_warp.scenes.poured_controller import Phase, PouredController
-from dem_warp.scenes.poured_scene import PouredScene
+from dem_warp import Material, Parameter, PouredController, PouredScene
+from dem_warp.scenes.poured_controller import Phase
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Decision, SceneState
 from dem_warp.walls import Cylinder, Disc

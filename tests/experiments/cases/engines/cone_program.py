@@ -29,6 +29,11 @@ def main(way=""):
             raise SystemExit("no license was found\n")
         case "silent":
             return
+        case "no-heap":
+            given = {"flow_rate": 0.0125} if "flow_rate" in case["observables"] else {}
+            answer = {"status": "finished", "observables": given}
+            Path("result.json").write_text(json.dumps(answer), encoding="utf-8")
+            return
         case "sleep":
             time.sleep(600.0)
     noise = 0.3 * math.sin(12.9898 * case["seed"])

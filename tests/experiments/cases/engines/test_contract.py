@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import dem_warp
+from small_study import ANGLE, TUBE
 
 from dem_warp import Case, CaseResult
 from dem_warp.clumps import ClumpShape
@@ -23,6 +25,7 @@ from experiments.io.errors import InputError
 from experiments.studyfile import Study, load_study
 from imaging import heap_angle
 
+HOPPER = '[scene.hopper]\ndiameter = "28 mm"\nfill_depth = "16 mm"\noutlet = "20 mm"\n'
 CONES = Path(__file__).with_name("cone_program.py")
 Write = Callable[..., Path]
 
@@ -208,6 +211,21 @@ def test_a_wrong_engine_is_refused_with_rule_and_place(
         engine_of(load_study(write_study(add=f"\n[engine]\n{section}\n")))
     assert rule in str(caught.value)
     assert place in caught.value.place
+
+
+def test_a_test_that_leaves_no_heap_needs_its_own_observables_and_no_heap_file(
+    write_study: Write, tmp_path: Path
+) -> None:
+    command = f"command = \"'{sys.executable}' '{CONES}' no-heap\"\nobservables = [\"flow_rate\"]"
+    path = write_study((TUBE, HOPPER), (ANGLE, ""), add=f"\n[engine]\n{command}\n")
+    assert engine_of(load_study(path)).observables == ("flow_rate",)
+    # the whole way: simulated, measured and written
+    code, out, err = dem_warp("heap", path, "--out", tmp_path / "out", "--json")
+    assert (code, json.loads(out)["observables"]) == (0, {"flow_rate": 0.0125}), err
+    # a lifted cylinder leaves a heap, which the angle is measured on
+    answer = run_one(load_study(write_study()), tmp_path, "no-heap")
+    assert answer.status == NO_ANSWER
+    assert "wrote no heap.csv" in answer.reason
 
 
 def test_a_command_finds_files_next_to_the_study_and_is_read_by_no_shell(

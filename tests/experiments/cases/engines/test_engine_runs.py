@@ -1,9 +1,11 @@
 """Cases and searches on a program of one's own: kept, repeated where it fails, and refused."""
 
+import math
 import sys
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +15,12 @@ from commandline import dem_warp
 
 from dem_warp import CaseResult, Progress
 from experiments.cases import OwnWorkers, Store, engine_of, run_cases
-from experiments.cases.engines.program import _gather
+from experiments.cases.engines.program import _gather, empty_result
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover.engine_simulator import EngineSimulator
 from experiments.discover.mechanism_files import library_for
-from experiments.studyfile import load_study
+from experiments.io.errors import InputError
+from experiments.studyfile import Study, load_study
 from experiments.studyfile.observables import PHOTOGRAPHED
 
 CONES = Path(__file__).with_name("cone_program.py")
@@ -30,6 +33,24 @@ def section(way: str = "", more: str = "") -> str:
 
 def runs(path: Path) -> Counter[str]:
     return Counter((path / "runs.txt").read_text().split())
+
+
+def test_results_are_checked_whoever_made_them(small_study: Study) -> None:
+    cases, workers = [small_study.case({}, seed) for seed in (1, 2)], OwnWorkers("cpu", 1)
+    heap = empty_result("finished", "", {})
+    odd = replace(heap, observables={"grain_count": 3.0, "t55": math.nan}, provenance={"engine": "odd"})
+    # neither of them calls on_result
+    good, bad = workers.simulate(cases, lambda cases, **_: [heap, odd])
+    assert good is heap
+    assert (bad.status, bad.reason) == ("failed", "odd returned t55 = nan")
+    assert bad.observables == {"grain_count": 3.0}
+    scene = replace(odd, provenance={})
+    bad = workers.simulate(cases, lambda cases, **_: [scene, heap])[0]
+    # the module that has the scene, and its package
+    assert bad.reason.startswith("dem_warp.scenes.lifted_cylinder (package dem-warp) returned t55")
+    for wrong in (None, [heap], [heap, "heap"]):
+        with pytest.raises(InputError, match="engine: must"):
+            workers.simulate(cases, lambda cases, wrong=wrong, **_: wrong)
 
 
 def test_cases_of_a_program_are_stored_and_its_failures_repeated(write_study: Write, tmp_path: Path) -> None:
