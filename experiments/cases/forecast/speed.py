@@ -25,8 +25,11 @@ NOTES, FORMAT, LARGEST, KEPT = "dem-warp/batches.json", 1, 1_000_000, 1000
 LEAST_SECONDS, LEAST_PART = 0.5, 0.5
 """Shortest time [s] and least part of the work that give a speed: progress comes ten times a second."""
 
-FASTEST = {False: 1.0e9, True: 1.0e12}
-"""Sphere-steps a second that no core and no GPU reaches: 30 and 80 times the fastest that was measured."""
+FASTEST = {False: 2.0e8, True: 1.0e11}
+"""Sphere-steps a second that no core and no GPU reaches: 6 and 8 times the fastest that was measured."""
+
+SLOWEST = 1.0e4
+"""Sphere-steps a second that every machine reaches: a hundredth of a heap of 30 spheres on one core."""
 
 LARGE = 1000.0
 """Spheres of a case from which its speed says something about the machine."""
@@ -93,7 +96,8 @@ def noted_batches() -> list[tuple[Load, float]]:
 
 def _is_possible(load: Load, speed: float) -> bool:
     sizes = (load.spheres, load.time_step, load.sphere_steps)
-    return all(0.0 < size < math.inf for size in sizes) and 0.0 < speed < FASTEST[load.on_gpu]
+    least = SLOWEST if load.sphere_steps > 1.0 else 0.0  # what a command does apart is one unit of work
+    return all(0.0 < size < math.inf for size in sizes) and least < speed < FASTEST[load.on_gpu]
 
 
 def note_batch(cases: Sequence[Case[Any] | Work], workers: Workers, part: float, seconds: float) -> None:

@@ -54,6 +54,9 @@ class CallResults:
         See `Workers.simulate`; their errors end the call.
     expected
         Predicted wall time of all [s].
+    at_once
+        Cases that run at the same time: the pace counts from when that many have begun, after every worker's
+        start and compilation.
     """
 
     def __init__(
@@ -62,6 +65,7 @@ class CallResults:
         on_result: OnResult | None,
         on_progress: OnProgress | None,
         expected: float | None = None,
+        at_once: int = 1,
     ) -> None:
         self._cases = cases
         self.costs = relative_work(cases)
@@ -70,6 +74,7 @@ class CallResults:
         self.fault: BaseException | None = None
         """Error of the caller's functions."""
         self._on_result, self._on_progress, self._expected = on_result, on_progress, expected
+        self._at_once = min(at_once, len(cases))
         self._started = time.perf_counter()
         self._fractions = np.zeros(len(cases))
         self._phases: dict[int, Mapping[str, int]] = {}
@@ -94,6 +99,14 @@ class CallResults:
     @property
     def _fraction(self) -> float:
         return 1.0 if self.is_complete else float(self.costs @ self._fractions / self.costs.sum())
+
+    @property
+    def _under_way(self) -> int:
+        """Cases that have ended, or have begun."""
+        running = Counter[str]()
+        for counts in self._phases.values():
+            running.update(counts)
+        return len(self.results) + running.total() - running["waiting"]
 
     def left(self, members: Sequence[int]) -> list[int]:
         """Return the members of a batch that have given no result yet."""
@@ -121,9 +134,9 @@ class CallResults:
         if left := self.left(members):
             ended = len(members) - len(left)
             self._fractions[left] = np.clip((progress.fraction * len(members) - ended) / len(left), 0.0, 1.0)
-        if self._begun is None and self._fraction > 0.0:
-            self._begun = (self._fraction, time.perf_counter())
         self._phases[batch] = progress.phase_counts
+        if self._begun is None and self._fraction > 0.0 and self._under_way >= self._at_once:
+            self._begun = (self._fraction, time.perf_counter())
         self.report()
 
     def end(self, batch: int) -> None:

@@ -132,7 +132,7 @@ class DaskWorkers:
             return []
         self._await_workers()
         expected = None if engine else expected_seconds(cases, self)
-        results = CallResults(cases, on_result, on_progress, expected)
+        results = CallResults(cases, on_result, on_progress, expected, self.count)
         shares = self._shares() if engine is None else None
         batches = plan_batches(cases, results.costs, self.count, *(shares or ()))
         if checkpoint is not None:

@@ -108,6 +108,15 @@ def test_a_heap_is_planned_with_its_settings(write_study: Write) -> None:
     assert plan["cases"] == plan["most"] == 1
 
 
+def test_a_campaign_and_one_of_its_heaps_have_forecasts_that_agree(write_study: Write) -> None:
+    campaign = planned("calibrate", write_study())
+    heap = json.loads(dem_warp("heap", write_study(), "--device", "cpu", "--dry-run", "--json")[1])
+    each = [2 * batch["seconds"] / batch["cases"] for batch in campaign["batches"] if batch["cases"]]
+    one = heap["batches"][0]["seconds"]
+    assert 1 / 1.5 < np.average(each) / one < 1.5  # two workers share the campaign
+    assert all(1 / 1.5 < seconds / one < 1.5 for seconds in each)
+
+
 def test_jobs_are_not_submitted_for_a_plan(write_study: Write, tmp_path: Path) -> None:
     profile = tmp_path / "cluster.toml"
     profile.write_text('[cluster]\nkind = "slurm"\nworkers = 4\nqueue = "main"\n', encoding="utf-8")

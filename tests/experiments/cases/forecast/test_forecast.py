@@ -10,17 +10,19 @@ from typing import Any
 import pytest
 
 from dem_warp import MECHANISMS, SCENES, simulate
-from experiments.cases import OwnWorkers
+from experiments.cases import OwnWorkers, Resources, open_workers
 from experiments.cases.forecast import speed
 from experiments.cases.forecast.speed import (
     Load,
     expected_seconds,
     forecast,
     note_batch,
+    noted_batches,
     noted_speed,
     source_of,
 )
 from experiments.cases.forecast.work import Work, _phases, rest_of, work_of
+from experiments.cases.workers import call_results
 from experiments.cases.workers.call_results import CallResults, ExpectedProgress
 from experiments.commands.console import describe_progress
 from experiments.studyfile import Study
@@ -139,6 +141,50 @@ def test_a_damaged_file_and_speeds_of_an_earlier_format_are_ignored(
     rows += [{"load": load | {"spheres": 0.0}, "speed": 1.0e7}]
     notes.write_text(json.dumps({"format": 1, "batches": rows}), encoding="utf-8")
     assert noted_speed("this") == (1.0e7, (0,))
+
+
+@pytest.mark.parametrize("bad", [9.0e8, 3.0e12, 10.0, 0.0, -1.0, float("inf"), float("nan"), "fast", None])
+def test_a_bad_value_in_the_cache_changes_no_forecast(notes: Path, bad: Any) -> None:
+    load = asdict(Load.of([WORK], workers_of()))
+    notes.parent.mkdir()
+    notes.write_text(json.dumps({"format": 1, "batches": [{"load": load, "speed": bad}]}), encoding="utf-8")
+    assert forecast([WORK], workers_of()) == (None, ())
+    note([WORK], workers_of(), 10.0)
+    assert forecast([WORK], workers_of())[0] == pytest.approx(10.0)
+
+
+def test_a_slow_first_start_is_no_part_of_the_speed(
+    small_study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(call_results, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+    call = CallResults([small_study.case({}, seed) for seed in (1, 2)], None, None, at_once=2)
+    # The first worker compiles for 90 s, the second starts 20 s after it; both then work for 8 s.
+    for now[0], share, phases in (
+        (90.0, 0.0, {"waiting": 2}),
+        (91.0, 0.1, {"fill": 1, "waiting": 1}),
+        (111.0, 0.2, {"fill": 2}),
+    ):
+        call.follow(0, [0, 1], ExpectedProgress(0, 2, share, phases, 0.0))
+    now[0] = 119.0
+    for index in (0, 1):
+        call.take(index, SimpleNamespace(status="finished"))  # type: ignore[arg-type]
+    assert call.pace == (pytest.approx(0.8), pytest.approx(8.0))
+
+
+def test_one_and_two_workers_measure_much_the_same_speed_of_a_worker(
+    small_study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(speed, "LEAST_SECONDS", 0.0)
+    monkeypatch.setattr(speed, "LEAST_PART", 0.0)
+    speeds = []
+    for count in (1, 2):
+        with open_workers(Resources("cpu", count)) as workers:
+            for cases in (count, 4 * count):  # the first call starts the processes
+                workers.simulate([small_study.case({}, seed) for seed in range(cases)])
+        speeds.append(noted_batches()[-1][1])
+    one, two = speeds
+    assert 0.2 < two / one < 5.0  # a machine that is busy with other work halves a core, or gives it twice
 
 
 def test_a_finished_batch_notes_its_speed(small_study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
