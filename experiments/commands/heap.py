@@ -21,7 +21,7 @@ from experiments.commands.options import (
     with_request,
 )
 from experiments.commands.plans import show_plan
-from experiments.commands.results import print_doubts, print_measured
+from experiments.commands.results import print_measured, print_study
 from experiments.live.server import live_page
 from experiments.runs.request import RunRequest
 
@@ -91,7 +91,7 @@ def heap(
         frames=frames, movie=movie, live=live, json=as_json,
     )  # fmt: skip
     with clear_errors(advice), live_page(prepared.folder, live, messages.print):
-        print_doubts(prepared.study)
+        print_study(prepared.study, prepared.resources)
         simulated = run_heap(prepared, order)
     _print_heap(simulated, prepared.folder, as_json)
 

@@ -31,11 +31,6 @@ def print_study(study: Study, resources: Resources) -> None:
     engine = study.engine and (study.engine.command or study.engine.name)
     by = f", simulated by the program: {engine}" if engine else ""
     messages.print(f"{study.name}, on {resources}{by}", study.note, sep="\n")
-    print_doubts(study)
-
-
-def print_doubts(study: Study) -> None:
-    """Warn of unlikely values of a study."""
     for doubt in study.doubts():
         messages.print(f"Doubtful: {doubt}")
 

@@ -96,6 +96,7 @@ def test_a_heap_that_cannot_be_drawn_has_a_reason(write_study: Write, tmp_path: 
     study, out = write_study(add=section("high")), tmp_path / "out"
     code, _, err = dem_warp("heap", study, "--out", out, "--device", "cpu")
     assert (code, "no heap" in err) == (1, True)
+    assert f"'{CONES}' high" in err.splitlines()[0], "the program that a study starts is named first"
     assert (out / "heap.vtp").exists()
     assert not (out / "snapshot.png").exists()
 
