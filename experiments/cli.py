@@ -13,6 +13,7 @@ from experiments.commands.angle import ANGLE_EXAMPLE, angle
 from experiments.commands.bridge import BRIDGE_EXAMPLE, bridge
 from experiments.commands.calibrate import CALIBRATE_EXAMPLE, calibrate
 from experiments.commands.clump import CLUMP_EXAMPLE, clump
+from experiments.commands.console import BAD_INPUT, messages
 from experiments.commands.discover import DISCOVER_EXAMPLE, discover
 from experiments.commands.doctor import DOCTOR_EXAMPLE, doctor
 from experiments.commands.export import EXPORT_EXAMPLE, export
@@ -22,6 +23,8 @@ from experiments.commands.options import show_version
 from experiments.commands.streams import lasting_streams
 from experiments.commands.ui import UI_EXAMPLE, ui
 from experiments.commands.watch import WATCH_EXAMPLE, watch
+from experiments.io.errors import InputError
+from experiments.io.own_packages import require_own_packages
 
 app = typer.Typer(
     name="dem-warp",
@@ -58,4 +61,9 @@ app.command(epilog=UI_EXAMPLE)(ui)
 def main() -> None:
     """Run the command line."""
     with lasting_streams():
+        try:
+            require_own_packages()
+        except InputError as error:
+            messages.print(f"Error: {error}")
+            raise SystemExit(BAD_INPUT) from None
         app()

@@ -32,8 +32,9 @@ from experiments.cases.forecast.speed import UNKNOWN, noted_speed, source_of
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.resources import PROCESS_BYTES
 from experiments.cases.workers.submissions import submit_command
+from experiments.io.own_packages import OWN
 from experiments.io.plug_ins import plug_ins
-from experiments.io.program_version import program_version
+from experiments.io.program_version import ROOT, program_version
 from experiments.runs.choices import BENCH, PAPER
 from experiments.studyfile import load_study
 from imaging.drawing.opengl import opengl_works
@@ -71,6 +72,7 @@ def examine(resources: Resources, cache: Finding) -> list[Finding]:
     versions = f"dem-warp {program_version()}, Warp {wp.__version__}, Python {platform.python_version()}"
     return [
         Finding("versions", True, versions),
+        Finding("packages", True, f"{', '.join(OWN)}: all of dem-warp, in {ROOT}"),
         *(Finding("plug-in", True, str(each)) for each in plug_ins()),
         *_tried("GPU", _gpus),
         *_tried("cores", _cores),

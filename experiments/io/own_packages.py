@@ -1,0 +1,46 @@
+"""The four packages of dem-warp by their names, which packages of others have too."""
+
+from __future__ import annotations
+
+from importlib.metadata import packages_distributions
+from importlib.util import find_spec
+from pathlib import Path
+
+from experiments.io.errors import InputError
+from experiments.io.program_version import ROOT
+
+OWN = {
+    "dem_warp": "Discrete element simulation of clumped grains",
+    "doe": "Designs of experiments and their analysis.",
+    "imaging": "Pictures and repose angles: heaps",
+    "experiments": "Everything that a person runs, from",
+}
+"""Packages, and how the text of each begins."""
+
+
+def foreign_packages() -> list[tuple[str, Path]]:
+    """Return the names that Python finds another package under, and its file; nothing is imported."""
+    found = {name: _file_of(name) for name in OWN}
+    return [(name, path) for name, path in found.items() if not _is_own(name, path)]
+
+
+def require_own_packages() -> None:
+    """Raise InputError where a package of others has taken the place of one of dem-warp's."""
+    for name, path in foreign_packages():
+        others = [each for each in packages_distributions().get(name, []) if each != "dem-warp"]
+        problem = f"{path} is not dem-warp's" + (f" but of the package {others[0]}" if others else "")
+        remove = f"Uninstall {others[0]}" if others else f"Move or rename {path.parent}"
+        hint = f"{remove}; if it has overwritten files: pip install --force-reinstall --no-deps dem-warp"
+        raise InputError(f"package {name}", problem, hint=hint)
+
+
+def _file_of(name: str) -> Path:
+    spec = find_spec(name)
+    return Path(spec.origin or name) if spec else Path(name)
+
+
+def _is_own(name: str, path: Path) -> bool:
+    """Return whether a file is in its place next to the others, and begins with its own text."""
+    if path.resolve() != ROOT / name / "__init__.py" or not path.is_file():
+        return False
+    return path.read_text(encoding="utf-8", errors="replace").startswith(f'"""{OWN[name]}')
