@@ -207,6 +207,9 @@ def _region_decision(
     outcome = f"{region.fraction:.0%} of the design region is compatible with the target."
     if len(region.factors) > 1 and joint is None:
         outcome += " The target is one equation: the factors trade off along its contour."
+    ends = [f"{name} ({end})" for name, row in region.open_ends.iterrows() for end in row.index[row]]
+    if ends:
+        outcome += f" Ranges that end at the edge of what was explored: {', '.join(ends)}."
     if unidentified:
         alone = "by this target alone" if joint is None else "by these responses"
         outcome += f" Not pinned down {alone}: {', '.join(unidentified)}."

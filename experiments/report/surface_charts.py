@@ -149,7 +149,8 @@ def _contour_chart(
     add_level(figure, grid, f"target {quantity(level, plane.response.unit)}", level, GREEN, 3)
     add_design(figure, plane, result.design)
     add_settings(figure, plane, target.truth, optimum.point if optimum else None, "optimum")
-    shown = "target curve and compatible region (green); the dotted box is coded −1 to +1."
+    shown = "target curve (reduced model) and compatible region (green, full model); "
+    shown += "the dotted box is coded −1 to +1."
     caption = f"Fitted {plane.response.name}, {shown}"
     return Chart(f"contour-{plane.x}-{plane.y}", caption + plane.held_text, figure, height="tall")
 
@@ -165,9 +166,9 @@ def _curve_chart(
     around = np.r_[fit["confidence_low"], fit["confidence_high"][::-1]]
     shade = {"fill": "toself", "fillcolor": "rgba(0,114,178,0.15)", "hoverinfo": "skip", "line": {"width": 0}}
     figure.add_scatter(
-        x=np.r_[x, x[::-1]], y=around, mode="lines", name="95 % confidence of the fit", **shade
+        x=np.r_[x, x[::-1]], y=around, mode="lines", name="95 % confidence, full model", **shade
     )
-    add_line(figure, x, fit["mean"], "fit", BLUE)
+    add_line(figure, x, fit["mean"], "fit, reduced model", BLUE)
     full = result.leading.full
     add_points(figure, full.design.natural[factor.name], full.response, "case", BLUE, size=8)
     if target.truth is not None:

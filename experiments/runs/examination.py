@@ -176,8 +176,8 @@ def _memory(resources: Resources) -> Finding:
     if available := re.search(r"MemAvailable:\s+(\d+) kB", _text_of(MEMORY)):
         free = 1024 * int(available[1])  # with what the system's cache would give back
     needed = PROCESS_BYTES * (resources.count + 1)
-    text = f"{there / 1e9:.3g} GB, {free / 1e9:.3g} GB available"
-    cure = f"{resources} needs {needed / 1e9:.2g} GB. Close other programs, or lower --workers."
+    text = f"{there / 1e9:.3g} GB, {free / 1e9:.3g} GB available; {resources} needs {needed / 1e9:.2g} GB"
+    cure = "Close other programs, or lower --workers."
     return Finding("memory", free >= needed, text, cure="" if free >= needed else cure)
 
 

@@ -74,7 +74,9 @@ def test_the_nearest_point_of_a_line(line: float) -> None:
 
 
 def test_a_range_that_ends_where_nothing_was_explored_is_open_there() -> None:
-    region = find_optimum(plane_study(), explored(3.0), aim(20.0)).region
+    optimum = find_optimum(plane_study(), explored(3.0), aim(20.0))
+    region = optimum.region
+    assert "of what was explored: E (low), E (high), F (low), F (high)." in optimum.decisions[1].outcome
     assert region.open_ends.to_numpy().all()
     # The line E + F = 0 meets the circle of the runs, of radius sqrt(2), at -1 and 1: to two cells of .007
     # and the slant of a band that is ten standard errors wide.
