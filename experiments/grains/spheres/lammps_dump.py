@@ -45,7 +45,10 @@ class _Frame:
 
 
 def _frames(path: Path) -> Iterator[_Frame]:
-    """Yield the frames, with one in memory at a time."""
+    """Yield the frames, with one in memory at a time.
+
+    An item that a frame has already begins the next: LAMMPS writes UNITS (once) and TIME before TIMESTEP.
+    """
     frame, rows = _Frame(1), []
     with path.open(encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, start=1):
@@ -53,11 +56,11 @@ def _frames(path: Path) -> Iterator[_Frame]:
                 rows.append(line.rstrip("\n"))
                 continue
             words = line.split()[1:]
-            if words[:1] == ["TIMESTEP"] and frame.items:
-                yield frame
-                frame = _Frame(number)
             rows = []
             name, columns = _item(words)
+            if name in frame.items:
+                yield frame
+                frame = _Frame(number, {key: frame.items[key] for key in ("UNITS",) if key in frame.items})
             frame.items[name] = rows
             if name in ("ATOMS", "BOX BOUNDS"):
                 frame.items[f"{name} columns"] = columns

@@ -31,11 +31,21 @@ HEAD = 65536
 GZIP = b"\x1f\x8b"
 """First bytes of a file that is compressed by gzip."""
 
+_CUSTOM = "Write a custom dump with x y z radius."
+_BINARY = ("a binary dump of LAMMPS or LIGGGHTS", "Write a text dump: a name that does not end in .bin.")
 _VIDEO = ("a video", "Save one frame as PNG or JPEG.")
 _PACKED = ("a compressed file", "Decompress it, or compress it by gzip.")
 OTHERS = {
-    "LAMMPSCUSTOM": ("a binary dump of LAMMPS", "Write a text dump: a name that does not end in .bin."),
-    "DUMPCUSTOM": ("a binary dump of LAMMPS", "Write a text dump: a name that does not end in .bin."),
+    "LAMMPSCUSTOM": (
+        "a binary dump of LAMMPS or LIGGGHTS",
+        "Write a text dump: a name that does not end in .bin.",
+    ),
+    "DUMPCUSTOM": (
+        "a binary dump of LAMMPS or LIGGGHTS",
+        "Write a text dump: a name that does not end in .bin.",
+    ),
+    "Atoms. Timestep": ("an XYZ dump of LAMMPS or LIGGGHTS, without radii", _CUSTOM),
+    "Number of particles =": ("an AtomEye configuration (cfg)", _CUSTOM),
     "\x89HDF": ("an HDF5 file", "Export centres and radii as VTK or CSV."),
     "CDF": ("a NetCDF file", "Export centres and radii as VTK or CSV."),
     "BZh": _PACKED,
@@ -96,6 +106,9 @@ def require_known(path: Path) -> None:
     for mark, (name, hint) in OTHERS.items():
         if mark in start:
             raise InputError(str(path), f"is {name}, neither a picture nor a file of spheres", hint=hint)
+    if path.suffix == ".bin" and "\0" in start:  # that of LIGGGHTS has no mark
+        name, hint = _BINARY
+        raise InputError(str(path), f"seems to be {name}", hint=hint)
 
 
 def read_spheres(path: Path, largest: int = LARGEST) -> SphereFile:
