@@ -65,7 +65,8 @@ def engine_of(study: Study) -> Engine | None:
         solver.check_solver(OWN_SOLVER, solver_place)
         return None
     if section.command is not None:
-        _check_observables(study, section.observables, f"{place}.observables")
+        declared = dict.fromkeys(name for scene in study.scenes.values() for name in scene.observables)
+        _check_observables(section.observables, list(declared), f"{place}.observables")
         more = (section.version, section.observables)
         command = command_program(section.command, study.file.parent, f"{place}.command", *more)
         solver.check_solver(command.name, solver_place)
@@ -85,9 +86,8 @@ def engine_of(study: Study) -> Engine | None:
     return engine
 
 
-def _check_observables(study: Study, names: tuple[str, ...], place: str) -> None:
+def _check_observables(names: tuple[str, ...], known: list[str], place: str) -> None:
     """Refuse names that no scene of the study declares; a heap's shape is measured here."""
-    known = list(dict.fromkeys(name for scene in study.scenes.values() for name in scene.observables))
     if unknown := [name for name in names if name not in known]:
         rule = f"must be of {', '.join(known)}, as the heap shows the others"
         raise StudyError(place, rule, ", ".join(unknown))
