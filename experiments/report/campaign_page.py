@@ -35,10 +35,14 @@ def render_page(
     context = Context(campaign, labels)
     chapters = [chapter("heaps")] if pictures or solid else []
     chapters += stage_chapters(context)
-    values = None
+    values = fixed = None
     if campaign.optimum is not None:
-        values = values_table(campaign, campaign.optimum, study)
-        chapters += [other_codes_chapter(study, campaign.optimum), chapter("paper_text")]
+        values, case = (
+            values_table(campaign, campaign.optimum, study),
+            study.case(campaign.optimum.settings, 1),
+        )
+        fixed = fixed_table(study, campaign.optimum, case)
+        chapters += [other_codes_chapter(case), chapter("paper_text")]
     chapters.append(failed_chapter(campaign))
     chapters += [*companion_of(study).campaign_chapters(campaign), chapter("provenance")]
     drawn_on = {
@@ -48,7 +52,7 @@ def render_page(
         "sentence": verdict_sentence(campaign),
         "cautions": cautions(campaign, study),
         "values": values,
-        "fixed": fixed_table(study, campaign.optimum) if campaign.optimum else None,
+        "fixed": fixed,
         "pastes": pastes(campaign, study, provenance or {}),
         "solid": solid,
         "calibrated": headline(campaign) == HEADLINES[Outcome.CALIBRATED],

@@ -7,19 +7,16 @@ from typing import Any
 import pandas as pd
 
 from dem_warp import Case
-from experiments.calibrate.results import OptimumResult
 from experiments.export import EXPORTERS, case_terms, term_warnings
 from experiments.report.kit.html import Chapter
 from experiments.report.kit.table import Layout, Table, columns, make_table
 from experiments.report.sections import chapter
-from experiments.studyfile import Study
 
 NAME = "other_codes"
 
 
-def other_codes_chapter(study: Study, optimum: OptimumResult) -> Chapter:
-    """Build the chapter of the values at the chosen point, a table for every code that they can go to."""
-    case = study.case(optimum.settings, 1)
+def other_codes_chapter(case: Case[Any]) -> Chapter:
+    """Build the chapter of a case's values, a table for every code that they can go to."""
     return chapter(NAME, {EXPORTERS[name].code: _terms_table(name, case) for name in EXPORTERS})
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dem_warp import Case
 from doe import Comparison, Factor, ScreenResult, Surface
 from experiments.calibrate.results import (
     Campaign,
@@ -248,11 +249,10 @@ def values_table(campaign: Campaign, optimum: OptimumResult, study: Study) -> Ta
     return make_table("values", frame, shown, caption, say("note.values") if len(chosen) > 1 else "", marks)
 
 
-def fixed_table(study: Study, optimum: OptimumResult) -> Table:
+def fixed_table(study: Study, optimum: OptimumResult, case: Case[Any]) -> Table:
     """Lay out all else that a code must be given: what the study fixes, with the modulus as simulated."""
     chosen = with_factor_values(study.document, study.factor_sections, optimum.settings)
     varied = {place for section in study.factor_sections for place in section.parameter}
-    case = study.case(optimum.settings, 1)
     moduli = {"grain": case.grain_material.shear_modulus, "wall": study.wall.shear_modulus}
     rows = [
         {"what": place.replace(".", ", ").replace("_", " "), "value": str(value), "note": ""}
