@@ -28,6 +28,8 @@ def show_plan(plan: Plan, as_json: bool) -> NoReturn:
         numbers = (f"{number:,}" for number in (batch.cases, batch.most, batch.grains, batch.steps))
         table.add_row(batch.name, *numbers, _time(batch.seconds))
     Console(markup=False).print(table)
+    for doubt in plan.doubts:
+        typer.echo(plain(f"Doubtful: {doubt}"))
     seconds, source = totals["seconds"], totals["source"]
     what = "of each GPU" if plan.on_gpu else "of this machine"
     typer.echo(f"Total: {totals['cases']:,} cases, at most {totals['most']:,}.")

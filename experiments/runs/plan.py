@@ -64,6 +64,8 @@ class Plan:
     memory: float
     disk: float
     on_gpu: bool
+    doubts: tuple[str, ...] = ()
+    """Unlikely values of the study."""
 
     @property
     def totals(self) -> dict[str, Any]:
@@ -154,7 +156,7 @@ def _plan(command: str, prepared: Prepared, stages: Sequence[_Stage], stored: fl
     except ValueError as error:  # the reason why a case cannot begin
         raise StudyError(str(study.file), str(error), study.scale or "this study") from error
     disk = PAGE_BYTES + stored * sum(batch.most for batch in batches)
-    return Plan(study.name, str(resources), batches, memory, disk, resources.on_gpu)
+    return Plan(study.name, str(resources), batches, memory, disk, resources.on_gpu, study.doubts())
 
 
 def _batch(name: str, some: Sequence[Case], count: int, most: int, resources: Resources) -> PlannedBatch:

@@ -88,13 +88,23 @@ def _cleaned(corners: Corners, faces: Faces) -> tuple[Corners, Faces]:
     faces = welded[own.ravel()[faces]]
     distinct = faces[[len(set(face)) == 3 for face in faces.tolist()]]
     _, first = np.unique(np.sort(distinct, axis=1), axis=0, return_index=True)
-    return middles, distinct[np.sort(first)]
+    kept = distinct[np.sort(first)]
+    sides = middles[kept[:, 1:]] - middles[kept[:, :1]]
+    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    full = kept[areas > WELDED * (sides**2).sum(axis=(1, 2))]
+    # an empty triangle with three corners may close a surface, or stick to it
+    return middles, full if (_edges(full)[1] == 2).all() else kept
+
+
+def _edges(faces: Faces) -> tuple[Faces, Faces]:
+    """Return the edges of faces, and the number of faces at each."""
+    pairs = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    return np.unique(pairs, axis=0, return_counts=True)
 
 
 def _closed(path: Path, corners: Corners, faces: Faces, unit: float) -> Trimesh:
     """Build a closed surface; raise `InputError` with its open edges."""
-    pairs = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges, counts = np.unique(pairs, axis=0, return_counts=True)
+    edges, counts = _edges(faces)
     for wrong, finding, name, hint in (
         (counts > 2, "has inner walls", "edges of three triangles or more", "Remove them in a mesh program."),
         (counts == 1, "is open", "open edges", "Close the hole in a mesh program (in MeshLab: Close Holes)."),

@@ -68,6 +68,9 @@ OTHERS = {
 }
 """Names of other formats, with a hint, by a mark in their first 32 bytes."""
 
+WEB = ("<!doctype html", "<html")
+"""Beginnings of a web page: a download often is the page of an error."""
+
 
 @contextmanager
 def _opened(path: Path, largest: int = LARGEST) -> Iterator[IO[bytes]]:
@@ -94,6 +97,8 @@ def head_of(path: Path) -> str:
 def format_of(path: Path) -> Format | None:
     """Find the format of a file by its content; None if it has none of `FORMATS`."""
     head = head_of(path)
+    if head.lstrip().lower().startswith(WEB):
+        return None
     known = [NUMPY] if "\0" in head else FORMATS
     if head.startswith("# vtk DataFile") or "<VTKFile" in head[:4096]:
         known = [VTK]
@@ -109,6 +114,11 @@ def require_known(path: Path) -> None:
     if path.suffix == ".bin" and "\0" in start:  # that of LIGGGHTS has no mark
         name, hint = _BINARY
         raise InputError(str(path), f"seems to be {name}", hint=hint)
+    if start.lstrip().lower().startswith(WEB):
+        raise InputError(str(path), "is a web page", hint="Download the file that the page shows.")
+    if start.strip() and all(" " <= sign <= "~" or sign in "\t\r\n" for sign in start):
+        problem = "is text, neither a picture nor a file of spheres"
+        raise InputError(str(path), problem, hint="A table needs columns x, y, z and a radius or a diameter.")
 
 
 def read_spheres(path: Path, largest: int = LARGEST) -> SphereFile:
