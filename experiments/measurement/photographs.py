@@ -17,7 +17,7 @@ import numpy as np
 from scipy import special
 
 from doe import Sample
-from experiments.grains.spheres import require_known
+from experiments.grains.spheres import require_known, require_no_text
 from experiments.io.errors import InputError
 from experiments.io.files import replacing
 from experiments.measurement.duplicates import Duplicates
@@ -154,6 +154,7 @@ def _measured_row(picture: Path, options: PictureOptions, copy: Path | None) -> 
             draw: Callable[[], tuple[Picture, ...]] = heap.pictures
         else:
             require_known(picture)
+            require_no_text(picture)
             angle = measure_photograph(picture, options.fit, options.view)
             row |= _values(angle)
             row["correction"] = angle.correction

@@ -116,7 +116,12 @@ def require_known(path: Path) -> None:
         raise InputError(str(path), f"seems to be {name}", hint=hint)
     if start.lstrip().lower().startswith(WEB):
         raise InputError(str(path), "is a web page", hint="Download the file that the page shows.")
-    if start.strip() and all(" " <= sign <= "~" or sign in "\t\r\n" for sign in start):
+
+
+def require_no_text(path: Path) -> None:
+    """Raise InputError for a text, which is no picture."""
+    start = " ".join(head_of(path)[:32].split()) if path.is_file() else ""
+    if start and start.isascii() and start.isprintable():
         problem = "is text, neither a picture nor a file of spheres"
         raise InputError(str(path), problem, hint="A table needs columns x, y, z and a radius or a diameter.")
 

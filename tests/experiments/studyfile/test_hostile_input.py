@@ -211,7 +211,7 @@ HOSTILE = {
     "a heap without radii": Hostile(f"angle {HEAPS}/liggghts_boundingBox_20000.vtk", ("an array radius",)),
     "no such solid": Hostile("clump cube:2 --spheres 3", ("cube",)),
     "no picture": Hostile("angle p.jpg", ("p.jpg: no such file",)),
-    "text as a picture": Hostile("angle p.jpg", ("p.jpg", "not a picture", "6 bytes"),
+    "text as a picture": Hostile("angle p.jpg", ("p.jpg", "is text", "neither a picture"),
                                  {"p.jpg": "hello\n"}),
     "unknown fit": picture("--fit wide", "fit", "flank, middle", "wide"),
     "one sphere as a heap": Hostile(

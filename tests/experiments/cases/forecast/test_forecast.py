@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from dem_warp import MECHANISMS, SCENES, simulate
+from dem_warp import MECHANISMS, SCENES, CaseResult, simulate
 from experiments.cases import OwnWorkers, Resources, open_workers
 from experiments.cases.forecast import speed
 from experiments.cases.forecast.speed import (
@@ -154,7 +155,7 @@ def test_a_bad_value_in_the_cache_changes_no_forecast(notes: Path, bad: Any) -> 
 
 
 def test_a_slow_first_start_is_no_part_of_the_speed(
-    small_study: Study, monkeypatch: pytest.MonkeyPatch
+    small_study: Study, cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [0.0]
     monkeypatch.setattr(call_results, "time", SimpleNamespace(perf_counter=lambda: now[0]))
@@ -168,7 +169,7 @@ def test_a_slow_first_start_is_no_part_of_the_speed(
         call.follow(0, [0, 1], ExpectedProgress(0, 2, share, phases, 0.0))
     now[0] = 119.0
     for index in (0, 1):
-        call.take(index, SimpleNamespace(status="finished"))  # type: ignore[arg-type]
+        call.take(index, cone())
     assert call.pace == (pytest.approx(0.8), pytest.approx(8.0))
 
 
