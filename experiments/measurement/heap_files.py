@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +70,6 @@ def heap_settings(unit: str | None, plate_height: str | None, types: str | None 
     return HeapSettings(size, height, tuple(name for name in names if name))
 
 
-@lru_cache(maxsize=1024)
 def is_heap_file(path: Path) -> bool:
     """Return True if the content of a file is spheres; False for a picture or a missing file."""
     return path.is_file() and format_of(path) is not None
