@@ -48,6 +48,16 @@ def test_classes_of_size_have_the_populations_moments() -> None:
     assert size_classes(0.9, 0.0) == ((0.9, 1.0),)
 
 
+def test_a_slower_rain_is_said_with_the_rate_that_makes_the_tests_equal() -> None:
+    test = exported("liggghts")
+    rate = Lift(test).rain_rate
+    assert rate < 0.9 * test.case.scene.rain_rate
+    for given, said in ((test.case.scene.rain_rate, True), (0.9 * rate, False)):
+        same = replace(test, case=replace(test.case, scene=replace(test.case.scene, rain_rate=given)))
+        [row] = [row for row in export_input(same, "liggghts").translated if row.subject == "filling"]
+        assert (f"rain_rate = {rate:.4g} in the study's scene" in row.there) is said
+
+
 def test_seeds_are_distinct_primes_above_ten_thousand() -> None:
     lift = Lift(exported("liggghts"))
     seeds = lift.seeds(40)
