@@ -16,6 +16,8 @@ import pytest
 from commandline import dem_warp
 from PIL import Image
 
+from imaging import heap_angle
+
 SLOPE = 25.0
 """Angle of the cone of spheres and of that on the picture [degrees]."""
 STUDY = (Path(__file__).parent / "small.toml").read_text(encoding="utf-8")
@@ -156,7 +158,6 @@ def saved(kind: str, mode: str = "RGB", turned: bool = False) -> Callable[[], by
 
 
 def study(old: str, new: str) -> Callable[[], str]:
-    assert STUDY.count(old) >= 1, old
     return lambda: STUDY.replace(old, new, 1)
 
 
@@ -300,16 +301,15 @@ def test_what_people_bring_is_answered(name: str, tmp_path: Path, monkeypatch: p
     else:
         assert code == 0, said
         if command == "angle":
-            # spheres on a lattice leave steps: the outline is flatter by a half of the last layer's height
             mean = float(out.rpartition("mean ")[2].split()[0])
-            assert mean == pytest.approx(SLOPE, abs=1.0)
-            assert "spheres of 2 mm radius" in said or not case.name.endswith((".dump", ".csv"))
+            if case.name.endswith((".dump", ".csv")):
+                # the angle is printed with two decimals, of positions with six digits or more
+                assert mean == pytest.approx(heap_angle(*cone()).mean, abs=0.02)
+                assert "spheres of 2 mm radius" in said
+            else:
+                # a pixel of the tip is 0.2 degrees, and the camera's noise blurs two
+                assert mean == pytest.approx(SLOPE, abs=0.5)
         else:
             # the box has 72 mm3; two spheres in it have less, and at least a third
             volume = float(out.partition("volume ")[2].split()[0])
             assert 24.0 < volume < 72.0
-
-
-def test_there_are_forty() -> None:
-    assert len(CASES) == 40
-    assert sum(bool(case.source) for case in CASES.values()) == 20
