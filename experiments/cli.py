@@ -15,6 +15,7 @@ from experiments.commands.calibrate import CALIBRATE_EXAMPLE, calibrate
 from experiments.commands.clump import CLUMP_EXAMPLE, clump
 from experiments.commands.console import BAD_INPUT, messages
 from experiments.commands.discover import DISCOVER_EXAMPLE, discover
+from experiments.commands.doe import doe
 from experiments.commands.doctor import DOCTOR_EXAMPLE, doctor
 from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.heap import HEAP_EXAMPLE, heap
@@ -53,6 +54,7 @@ app.command(epilog=CLUMP_EXAMPLE)(clump)
 app.command(epilog=NEW_EXAMPLE)(new)
 app.command(epilog=EXPORT_EXAMPLE)(export)
 app.command(epilog=BRIDGE_EXAMPLE)(bridge)
+app.add_typer(doe, name="doe")
 app.command(epilog=DOCTOR_EXAMPLE)(doctor)
 app.command(epilog=WATCH_EXAMPLE)(watch)
 app.command(epilog=UI_EXAMPLE)(ui)

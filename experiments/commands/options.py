@@ -147,12 +147,12 @@ def present_device(name: str | None) -> str | None:
         raise typer.BadParameter(str(error)) from None
 
 
-def assignments(texts: list[str]) -> dict[str, str]:
+def assignments(texts: list[str], option: str = "--set", example: str = "E=0.48") -> dict[str, str]:
     """Split ``NAME=VALUE`` options."""
     from experiments.io.errors import InputError
 
     pairs = [text.partition("=") for text in texts]
     for text, (name, equals, value) in zip(texts, pairs, strict=True):
         if not (name.strip() and equals and value.strip()):
-            raise InputError("--set", "needs NAME=VALUE, for example E=0.48", text)
+            raise InputError(option, f"needs NAME=VALUE, for example {example}", text)
     return {name.strip(): value.strip() for name, _, value in pairs}

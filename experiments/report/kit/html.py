@@ -44,12 +44,13 @@ class Chapter:
 def render_page(
     kind: str, heading: str, summary: str, chapters: Sequence[Chapter], context: Mapping[str, Any]
 ) -> str:
-    """Render a page with its chapters and 4.8 MB of plotly.js.
+    """Render a page with its chapters, and 4.8 MB of plotly.js if one has charts.
 
     `summary` is the template of its beginning, `context` has the values of all templates.
     """
     page = environment().get_template("page.html.j2")
-    shared = {"theme": theme, "plotly": Markup(get_plotlyjs()), "SHORT_ROWS": SHORT_ROWS}
+    plotly = Markup(get_plotlyjs()) if any(chapter.charts for chapter in chapters) else ""
+    shared = {"theme": theme, "plotly": plotly, "SHORT_ROWS": SHORT_ROWS}
     return page.render(kind=kind, heading=heading, summary=summary, chapters=chapters, **shared, **context)
 
 

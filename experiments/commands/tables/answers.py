@@ -1,0 +1,263 @@
+"""What the commands of ``dem-warp doe`` answer: texts, tables and plots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+import doe
+from doe import Category, Design, DesignError, Mixture, ScreenResult, Surface, Wish, plots
+from doe.response.analysis.formula import LinearFit
+from experiments.commands.tables.sheet import Sheet, read_mixture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_TRACES = 3
+"""Pairs of factors whose interaction is drawn, the largest effects first."""
+RIDGE_RADII = np.linspace(0.0, 1.0, 6)
+CLIMB_STEPS = 5
+
+
+@dataclass
+class Answer:
+    """The answer of a command, in parts that follow one another on its page."""
+
+    title: str
+    texts: list[str] = field(default_factory=list)
+    tables: dict[str, tuple[str, pd.DataFrame]] = field(default_factory=dict)
+    """By name: caption and table."""
+    plots: dict[str, tuple[str, Figure]] = field(default_factory=dict)
+    """By name: caption and figure."""
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, name: str, caption: str, make: Callable[[], Any]) -> None:
+        """Add a table or plot, or a note if the statistics have none for this design."""
+        try:
+            made = make()
+        except DesignError as error:
+            self.notes.append(f"No {caption[0].lower()}{caption[1:].rstrip('.')}: {error}.")
+            return
+        place = self.tables if isinstance(made, pd.DataFrame) else self.plots
+        place[name] = caption, made  # type: ignore[assignment]
+
+
+def run_table(design: Design | Mixture) -> pd.DataFrame:
+    """Return the runs in the order of execution, in natural units, with an empty column for the response."""
+    if isinstance(design, Mixture):
+        return design.shares.loc[design.run_order].rename_axis("run").assign(response="")
+    heads = {factor.name: factor.label for factor in design.factors}
+    table = design.natural.rename(columns=heads).join(design.coded[list(design.dummies)])
+    if design.blocks is not None:
+        table.insert(0, "block", design.blocks)
+    return table.loc[design.run_order].rename_axis("run").assign(response="")
+
+
+def describe_design(design: Design | Mixture, model: str, sd: float | None, effect: float | None) -> Answer:
+    """Describe a design before its runs: what it can tell apart, and with what power."""
+    answer = Answer(repr(design))
+    answer.tables["runs"] = "Runs in the order in which to do them.", run_table(design)
+    if isinstance(design, Mixture):
+        return answer
+    answer.notes += design.notes
+    if all(not isinstance(f, Category) or len(f.levels) == 2 for f in design.factors):
+        answer.add("aliases", "Effects that the design mixes up.", lambda: _alias_table(design))
+    answer.add("quality", "Efficiencies for the model.", lambda: _quality_table(design, model))
+    sizes = (effect,) if effect is not None else (1.0, 2.0) if sd is None else (sd, 2.0 * sd)
+    answer.add(
+        "power",
+        f"Probability that a term is found, for effects of {' and '.join(f'{size:g}' for size in sizes)} "
+        f"and a standard deviation of {1.0 if sd is None else sd:g}.",
+        lambda: doe.power_table(design, sizes, model=model, sd=1.0 if sd is None else sd),
+    )
+    return answer
+
+
+def _alias_table(design: Design) -> pd.DataFrame:
+    structure = doe.alias_structure(design)
+    if not structure.matrix.size:
+        raise DesignError("it mixes up nothing of up to two factors")
+    return structure.matrix.rename_axis("effect")
+
+
+def _quality_table(design: Design, model: str) -> pd.DataFrame:
+    quality = doe.design_quality(design, model)
+    rows = {f"{letter} efficiency": getattr(quality, f"{letter.lower()}_efficiency") for letter in "DAG"}
+    rows |= {f"variance inflation of {name}": value for name, value in quality.vif.items()}
+    return pd.Series(rows).rename_axis("measure").to_frame("value")
+
+
+def screen_table(sheet: Sheet, name: str, error: str | None, alpha: float) -> Answer:
+    """Screen the factors of a table of two-level runs."""
+    design, values = sheet.observed(name)
+    result = doe.screen(design, values, error)
+    answer = Answer(f"Screening of {name}", [result.summary()])
+    answer.tables["effects"] = "Effects, largest first.", result.table.sort_values("rank")
+    answer.tables["anova"] = "Analysis of variance.", result.anova
+    answer.add("aliases", "Effects that the design mixes up.", lambda: _alias_table(design))
+    if not design.dummies:
+        answer.add(
+            "interactions", "Effects with interactions, tested by Lenth's method.",
+            lambda: doe.two_level_effects(design, values).table,
+        )  # fmt: skip
+    answer.add("climb", "Steepest climb from the center.", lambda: _climb(result))
+    answer.plots["pareto"] = "Effects and the limits of the test.", plots.pareto_chart(result)
+    answer.plots["half_normal"] = "Half-normal plot.", plots.half_normal_plot(result, name)
+    _add_means(answer, design, values, name, list(result.table.sort_values("rank").index))
+    found = ", ".join(result.significant(alpha)) or "none"
+    answer.notes.insert(0, f"Significant at {alpha:g}: {found}.")
+    return answer
+
+
+def _climb(result: ScreenResult) -> pd.DataFrame:
+    path = doe.steepest_path(result, CLIMB_STEPS)
+    return path.natural.assign(predicted=path.predicted).rename_axis("run")
+
+
+def _add_means(
+    answer: Answer, design: Design, values: pd.Series, name: str, ranked: Sequence[str]
+) -> None:  # fmt: skip
+    """Add the plots of means by level, of single factors and of the largest ones in pairs."""
+    answer.add("main_effects", "Means by level.", lambda: plots.main_effects_plot(design, values, name))
+    pairs = [(x, trace) for i, x in enumerate(ranked) for trace in ranked[i + 1 :]][:MOST_TRACES]
+    for x, trace in pairs:
+        answer.add(
+            f"interaction_{x}_{trace}", f"Means by {x} and {trace}.",
+            lambda x=x, trace=trace: plots.interaction_plot(design, values, x, trace, name),
+        )  # fmt: skip
+
+
+def fit_table(sheet: Sheet, name: str, model: Any, alpha: float, reduced: bool) -> tuple[Answer, Surface]:
+    """Fit a response surface to a table of runs."""
+    design, values = sheet.observed(name)
+    whole = doe.fit_surface(design, values, model)
+    surface = whole.reduce(alpha) if reduced else whole
+    answer = Answer(f"Response surface of {name}", [surface.summary()])
+    answer.tables["coefficients"] = "Coefficients in coded units.", surface.coefficient_table
+    answer.tables["anova"] = "Analysis of variance by term.", surface.anova
+    answer.tables["anova_by_order"] = "Analysis of variance by order of the terms.", surface.anova_by_order
+    answer.tables["quality"] = "Quality of the fit.", _fit_quality(surface)
+    _add_canonical(answer, surface, alpha)
+    answer.add("influence", "Influence of each observation.", lambda: doe.influence(surface))
+    _add_checks(answer, surface)
+    answer.plots["residuals"] = "Residuals.", plots.residual_plots(surface)
+    _add_surface_plots(answer, surface, name)
+    return answer, surface
+
+
+def _fit_quality(surface: Surface) -> pd.DataFrame:
+    names = {
+        "r2": "R2", "r2_adjusted": "R2 adjusted", "r2_predicted": "R2 predicted", "press": "PRESS",
+        "residual_ms": "residual mean square", "residual_df": "residual degrees of freedom",
+        "cv_percent": "coefficient of variation [%]", "adequate_precision": "adequate precision",
+    }  # fmt: skip
+    rows = {text: getattr(surface, name) for name, text in names.items()}
+    rows["p of the lack of fit"] = surface.anova.loc["lack of fit", "p"]
+    return pd.Series(rows).rename_axis("measure").to_frame("value")
+
+
+def _add_canonical(answer: Answer, surface: Surface, alpha: float) -> None:
+    """Add the canonical analysis, and the best point at each distance from the center."""
+    try:
+        analysis = doe.canonical(surface, alpha)
+    except DesignError as error:
+        answer.notes.append(f"No canonical analysis: {error}.")
+        return
+    answer.texts.append(str(analysis))
+    answer.tables["canonical"] = (
+        "Canonical analysis: curvatures along the surface's own axes.",
+        (analysis.table.join(analysis.axes.T).rename_axis("axis")),
+    )
+    point = analysis.stationary
+    stationary = pd.DataFrame({"natural": point.natural, "coded": point.coded}).rename_axis("factor")
+    answer.tables["stationary"] = f"Stationary point: {point.kind}, {point.mean:.6g}.", stationary
+    for descend, text in ((False, "largest"), (True, "smallest")):
+        answer.add(
+            f"ridge_{text}", f"Ridge path to the {text} response.",
+            lambda descend=descend: doe.ridge_path(surface, RIDGE_RADII, descend=descend),
+        )  # fmt: skip
+
+
+def _add_checks(answer: Answer, surface: Surface) -> None:
+    """Add what the residuals say about the model."""
+    robust = doe.robust_coefficients(surface)
+    answer.tables["robust"] = "Coefficients with robust standard errors.", robust.table
+    answer.notes += [robust.note] if robust.note else []
+    try:
+        answer.notes.append(f"Power of the response by Box and Cox: {doe.box_cox(surface).advice}.")
+    except DesignError as error:
+        answer.notes.append(f"No Box-Cox power: {error}.")
+
+
+def _add_surface_plots(answer: Answer, surface: Surface, name: str) -> None:
+    names = surface.design.names
+    center = {factor.name: factor.center for factor in surface.design.factors}
+    if len(names) > 1:
+        answer.add("contour", "Contours.", lambda: plots.contour_plot(surface, response_label=name))
+        answer.add("surface", "Surface.", lambda: plots.surface_plot(surface, response_label=name))
+    if len(names) == 3:
+        answer.add(
+            "cube", "Fitted responses at the corners.", lambda: plots.cube_plot(surface, response_label=name)
+        )
+    answer.add("profile", "Profiles through the center.", lambda: plots.profile_plot({name: surface}, center))
+    if len(names) == 2:
+        answer.add(
+            "stationary_region", "Settings that may be the stationary point.",
+            lambda: plots.contour_plot(surface, region=doe.stationary_region(surface), response_label=name),
+        )  # fmt: skip
+
+
+def fit_formula_table(sheet: Sheet, name: str, formula: str) -> Answer:
+    """Fit the terms of a formula, in natural units."""
+    return _linear_answer(doe.fit_formula(*sheet.observed(name), formula, coded=False), name)
+
+
+def fit_mixture_table(path: Path, responses: Sequence[str], model: str) -> Answer:
+    """Fit Scheffe's polynomial to a table of blends."""
+    mixture, values = read_mixture(path, responses)
+    return _linear_answer(doe.fit_mixture(mixture, values, model), str(values.name))
+
+
+def _linear_answer(linear: LinearFit, name: str) -> Answer:
+    answer = Answer(f"Linear model of {name}", [linear.summary()])
+    answer.tables["coefficients"] = "Coefficients.", linear.coefficient_table
+    answer.add("anova", "Analysis of variance.", lambda: linear.anova())
+    answer.add("robust", "Coefficients with robust standard errors.", lambda: linear.robust_table())
+    return answer
+
+
+def best_setting(
+    surfaces: Mapping[str, Surface], wishes: Mapping[str, Wish | str], extent: float,
+    constraints: Sequence[str], seed: int,
+) -> Answer:  # fmt: skip
+    """Find the best setting of one response or several.
+
+    A wish is "max" or "min", for one response alone, or a `Wish`.
+    """
+    single = next(iter(wishes.values()))
+    search: dict[str, Any] = {"extent": extent, "constraints": list(constraints), "seed": seed}
+    if isinstance(single, str):
+        find = doe.maximize if single == "max" else doe.minimize
+        best = find(next(iter(surfaces.values())), **search)
+        scales = None
+    else:
+        scales = {name: wish for name, wish in wishes.items() if isinstance(wish, Wish)}
+        best = doe.most_desirable(surfaces, scales, **search)
+    answer = Answer("Best setting", [str(best)])
+    setting = pd.DataFrame({"natural": best.natural, "coded": best.coded}).rename_axis("factor")
+    answer.tables["setting"] = "The best setting.", setting
+    answer.tables["responses"] = "Fitted responses there.", best.responses.rename_axis("response")
+    point = dict(best.natural)
+    answer.add("profile", "Profiles through it.", lambda: plots.profile_plot(surfaces, point, scales))
+    if scales and len(best.natural) > 1:
+        limits = {name: (wish.low, wish.high) for name, wish in scales.items()}
+        answer.add(
+            "overlay", "Settings that keep all limits.",
+            lambda: plots.overlay_plot(surfaces, limits, at=point, point=point, extent=extent),
+        )  # fmt: skip
+    return answer
