@@ -12,8 +12,7 @@ before it runs  alias_structure, design_quality, power_table, detectable_effect,
 screened        screen, two_level_effects, steepest_path, climb_table
 fitted          fit_surface, fit_formula, fit_mixture; influence, box_cox, robust_coefficients
 best settings   canonical, ridge_path, stationary_region, maximize, minimize, most_desirable
-compared        compare_means, agreement, noise_floor, curvature_test, joint_fit, ProfileSample
-curves          CurveEmulator, fit_curves
+compared        compare_means, agreement, noise_floor, joint_fit, ProfileSample
 carried over    transfer, transfer_points
 
 ``doe.plots`` draws them.

@@ -1,10 +1,5 @@
 """The public names: each is loaded with its module when it is first used."""
 
-from .curves.curve_emulator import CurveEmulator as CurveEmulator
-from .curves.curve_fit import CurveFit as CurveFit
-from .curves.curve_fit import Forecast as Forecast
-from .curves.curve_fit import MeasuredCurve as MeasuredCurve
-from .curves.curve_fit import fit_curves as fit_curves
 from .curves.profile_sample import Mode as Mode
 from .curves.profile_sample import ProfileSample as ProfileSample
 from .curves.profile_sample import scatter_of_views as scatter_of_views
@@ -67,17 +62,13 @@ from .samples.agreement import Agreement as Agreement
 from .samples.agreement import Estimate as Estimate
 from .samples.agreement import agreement as agreement
 from .samples.replicate_noise import NoiseFloor as NoiseFloor
-from .samples.replicate_noise import VarianceRatio as VarianceRatio
-from .samples.replicate_noise import curvature_test as curvature_test
 from .samples.replicate_noise import detectable_effect as detectable_effect
 from .samples.replicate_noise import effect_power as effect_power
 from .samples.replicate_noise import noise_floor as noise_floor
-from .samples.replicate_noise import variance_ratio as variance_ratio
 from .samples.sample import Sample as Sample
 from .samples.two_means import Comparison as Comparison
 from .samples.two_means import compare_means as compare_means
 from .screen.screened_effects import ScreenResult as ScreenResult
-from .screen.screened_effects import aliases as aliases
 from .screen.screened_effects import screen as screen
 from .screen.steepest import ClimbPath as ClimbPath
 from .screen.steepest import climb_table as climb_table

@@ -15,8 +15,8 @@ from experiments.commands.calibrate import CALIBRATE_EXAMPLE, calibrate
 from experiments.commands.clump import CLUMP_EXAMPLE, clump
 from experiments.commands.console import BAD_INPUT, messages
 from experiments.commands.discover import DISCOVER_EXAMPLE, discover
-from experiments.commands.doe import doe
 from experiments.commands.doctor import DOCTOR_EXAMPLE, doctor
+from experiments.commands.doe import doe
 from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.heap import HEAP_EXAMPLE, heap
 from experiments.commands.new import NEW_EXAMPLE, new

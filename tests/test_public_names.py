@@ -42,3 +42,35 @@ def test_a_public_name_is_documented(name: str) -> None:
         written = thing.__doc__ or ""
         assert written.strip()
         assert not written.startswith(f"{short}("), "the docstring that dataclass makes up"
+
+
+def identifiers(tree: ast.AST) -> set[str]:
+    """Return the names and attributes in a piece of source."""
+    nodes = list(ast.walk(tree))
+    return {n.id for n in nodes if isinstance(n, ast.Name)} | {
+        n.attr for n in nodes if isinstance(n, ast.Attribute)
+    }
+
+
+def test_commands_reach_every_public_name_of_the_statistics() -> None:
+    """A command or a campaign imports it, or something that it imports needs it."""
+    parts: dict[str, set[str]] = {}
+    for path in (ROOT / "doe").rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                parts[node.name] = parts.get(node.name, set()) | identifiers(node)
+    product = [p for p in (ROOT / "experiments").rglob("*.py") if "evidence" not in p.parts]
+    sources = [ast.parse(p.read_text(encoding="utf-8")) for p in product]
+    imports = [n for tree in sources for n in ast.walk(tree) if isinstance(n, ast.ImportFrom | ast.Import)]
+    todo = {a.name for n in imports for a in n.names if getattr(n, "module", "doe").split(".")[0] == "doe"}
+    for tree in sources:
+        chains = [n for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
+        todo |= {n.attr for n in chains if isinstance(n.value, ast.Name) and n.value.id in ("doe", "plots")}
+    reached: set[str] = set()
+    while todo := (todo - reached) & parts.keys():
+        reached |= todo
+        todo = {name for part in todo for name in parts[part]}
+    for package in ("doe", "doe.plots"):
+        named = import_module(package)
+        public = {name for name in named.__all__ if callable(getattr(named, name))}
+        assert public - reached == set()

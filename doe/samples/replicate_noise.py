@@ -44,45 +44,9 @@ class NoiseFloor:
         return low, high
 
 
-@dataclass(frozen=True)
-class VarianceRatio:
-    """F test of one mean square against another, one-sided: the first one is larger."""
-
-    F: float
-    df: tuple[float, float]
-
-    @property
-    def p(self) -> float:
-        """Probability of such a ratio when both estimate the same variance."""
-        return float(stats.f.sf(self.F, *self.df))
-
-
 def noise_floor(values: Sample | Sequence[float] | NDArray, confidence: float = 0.95) -> NoiseFloor:
     """Return the noise floor of replicates of one setting (values, or their Sample)."""
     return NoiseFloor(Sample.of(values), checked_level(confidence, "confidence"))
-
-
-def variance_ratio(mean_sq: float, df: float, error_ms: float, error_df: float) -> VarianceRatio:
-    """Compare two independent mean squares, the first expected to be the larger."""
-    given = (("mean_sq", mean_sq), ("df", df), ("error_ms", error_ms), ("error_df", error_df))
-    first, first_df, second, second_df = (checked_number(*pair, above=0.0) for pair in given)
-    return VarianceRatio(first / second, (first_df, second_df))
-
-
-def curvature_test(
-    corners: Sample | Sequence[float] | NDArray, centers: Sample | Sequence[float] | NDArray
-) -> VarianceRatio:
-    """Test if the center is off the plane through a two-level design's runs.
-
-    Single-degree-of-freedom curvature nF nC (mean F - mean C)^2 / (nF + nC) against the spread of the
-    replicated centers (Montgomery, Design and Analysis of Experiments, section 6.8).
-    """
-    corner, center = Sample.of(corners), Sample.of(centers)
-    gap = corner.mean - center.mean
-    curvature = corner.n * center.n * gap**2 / (corner.n + center.n)
-    if not center.sd > 0.0:
-        raise DesignError("centers must differ, got the same value each time")
-    return VarianceRatio(curvature / center.sd**2, (1.0, float(center.df)))
 
 
 def effect_power(effect: float, sd: float, observations: int, error_df: float, alpha: float = 0.05) -> float:

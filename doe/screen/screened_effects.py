@@ -210,24 +210,6 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
     return ScreenResult(design, values, fit, replicates, chosen, named)
 
 
-def aliases(design: Design, interaction: str) -> pd.Series:
-    """Return the bias of each column's coefficient by an interaction that is not fitted.
-
-    The alias matrix (X'X)^-1 X'z of the product column z, for the intercept, every factor and every dummy:
-    +1/3 means that a third of the interaction is added to that coefficient.
-    """
-    checked_kind("design", design, Design)
-    product_of = polynomial_terms.find_term(interaction, _interactions(design))
-    columns = polynomial_terms.model_matrix(design.coded, [(name,) for name in design.coded.columns])
-    product = design.coded[list(product_of)].prod(axis=1)
-    weights = np.linalg.lstsq(columns.to_numpy(), product.to_numpy(), rcond=None)[0]
-    return pd.Series(weights, index=columns.columns, name=polynomial_terms.term_name(product_of))
-
-
-def _interactions(design: Design) -> list[polynomial_terms.Term]:
-    return [term for term in polynomial_terms.model_terms(design.names, "interaction") if len(term) == 2]
-
-
 def _error_term(
     design: Design, response: pd.Series, fit: RegressionResults, replicates: ErrorTerm, rule: str
 ) -> ErrorTerm:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from doe import Wish
     from experiments.commands.tables.answers import Answer
-    from experiments.commands.tables.sheet import Columns, Sheet
+    from experiments.commands.tables.sheet import Sheet
 
 doe = typer.Typer(no_args_is_help=True, help="Design experiments, and analyse a table of runs from anywhere.")
 
@@ -29,6 +29,10 @@ SCREEN_EXAMPLE = "Example: [bold]dem-warp doe screen runs.csv --response angle -
 FIT_EXAMPLE = "Example: [bold]dem-warp doe fit runs.csv --response angle --model quadratic --out fit[/]"
 OPTIMUM_EXAMPLE = "Example: [bold]dem-warp doe optimum runs.csv --wish angle=28.6 --wish time=min[/]"
 
+CLIMB_EXAMPLE = "Example: [bold]dem-warp doe climb climb.csv --target 28.6[/]"
+COMPARE_EXAMPLE = "Example: [bold]dem-warp doe compare runs.csv --value simulated --reference measured[/]"
+
+MODELS = ("first-order", "interaction", "quadratic", "three-factor")
 WISH = re.compile(r"(?P<aim>[^:]+)(?::\s*(?P<low>[^.\s]+(?:\.\d+)?)\s*\.\.\s*(?P<high>\S+))?")
 
 Table = Annotated[Path, typer.Argument(metavar="TABLE.csv", help="Runs: factors, and at least one response.")]
@@ -37,8 +41,8 @@ Factors = Annotated[
     typer.Option(
         "--factor",
         metavar="NAME=LOW..HIGH",
-        help="A factor with its levels -1 and +1, and its unit if it has one; NAME=one,two for a category. For "
-        "a table the name is enough. Default: every column that is nothing else.",
+        help="A factor with its levels -1 and +1, and a unit if it has one; NAME=one,two for a category. For "
+        "a table the name is enough. Default: the columns before the response.",
     ),
 ]
 Response = Annotated[
@@ -184,8 +188,8 @@ def optimum(
         list[str],
         typer.Option(
             metavar="NAME=AIM",
-            help="Aim of a response: max, min or a target; with the ends of its scale, e.g. angle=28.6:25..32. "
-            "Default: those of the runs.",
+            help="Aim of a response: max, min or a target; with ends of its scale, e.g. angle=28.6:25..32."
+            " Default: those of the runs.",
         ),
     ],
     factor: Factors = None,
@@ -208,12 +212,47 @@ def optimum(
         aims = assignments(wish, "--wish", "angle=28.6")
         sheet = _sheet(table, factor, list(aims), block)
         names = list(sheet.responses.columns)
-        surfaces = {name: fit_table(sheet, name, _terms(model), alpha, reduce)[1] for name in names}
         wishes = {
             name: _wish(aim, sheet.responses[name], alone=len(aims) == 1)
             for name, aim in zip(names, aims.values(), strict=True)
         }
+        surfaces = {name: fit_table(sheet, name, _terms(model), alpha, reduce)[1] for name in names}
         answer = best_setting(surfaces, wishes, extent, constraint or [], seed)
+    _show(answer, out, as_json, str(table))
+
+
+@doe.command(epilog=CLIMB_EXAMPLE)
+def climb(
+    table: Table,
+    target: Annotated[float, typer.Option(help="Response that is wanted.")],
+    response: Response = None,
+    factor: Factors = None,
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Show how far each run of a climb is from the target."""
+    with clear_errors():
+        from experiments.commands.tables.answers import climb_runs
+
+        sheet = _sheet(table, factor, [response] if response else [])
+        answer = climb_runs(sheet, sheet.responses.columns[0], target)
+    _show(answer, out, as_json, str(table))
+
+
+@doe.command(epilog=COMPARE_EXAMPLE)
+def compare(
+    table: Table,
+    value: Annotated[str, typer.Option(metavar="NAME", help="Column to judge, e.g. simulated.")],
+    reference: Annotated[str, typer.Option(metavar="NAME", help="Column to judge it by, e.g. measured.")],
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compare two columns run by run: bias, difference, slope and rank correlation."""
+    with clear_errors():
+        from experiments.commands.tables.answers import compare_columns
+
+        sheet = _sheet(table, None, [value, reference])
+        answer = compare_columns(sheet, *sheet.responses.columns)
     _show(answer, out, as_json, str(table))
 
 
@@ -241,7 +280,7 @@ def _number_or_word(text: str | None) -> float | str | None:
 
 def _terms(model: str) -> str | list[str]:
     """Return the name of a model, or its terms."""
-    return [term.strip() for term in model.split(",")] if "," in model or ":" in model else model
+    return model if model in MODELS else [term.strip() for term in model.split(",")]
 
 
 def _wish(aim: str, values: pd.Series, alone: bool) -> Wish | str:

@@ -10,7 +10,9 @@ import pandas as pd
 import pytest
 
 import doe
-from doe import Factor, Goal, MeasuredCurve, Sample, Wish, plots
+from doe import Factor, Goal, Sample, Wish, plots
+from doe.curves.curve_emulator import CurveEmulator
+from doe.curves.curve_fit import MeasuredCurve, fit_curves
 from doe.discrepancy import Measured, Settings, settings_of
 from doe.errors import RuleError
 from doe.plots.joint_plots import joint_plot
@@ -67,7 +69,7 @@ RIGHT_VALUES: list[tuple[Any, str]] = [
     (DESIGN.coded, "Design.coded"),
     (DESIGN.coded.assign(day=1), "table"),
     (BLOCKS, "Design.blocks pure_error.blocks labels"),
-    (SCREENING, "screen.design aliases.design"),
+    (SCREENING, "screen.design"),
     (BLENDS, "mixture"),
     (BLENDS.shares, "shares"),
     (EIGHT, "response"),
@@ -75,7 +77,7 @@ RIGHT_VALUES: list[tuple[Any, str]] = [
     (RESPONSE[:12], "screen.response"),
     (RESPONSE[:6], "fit_mixture.response transfer.response"),
     (RUNS, "transfer.runs"),
-    (VALUES, "a values reference corners centers climb_table.response climb_plot.response"),
+    (VALUES, "a values reference climb_table.response climb_plot.response"),
     (SURFACE, "surface source"),
     (SURFACES, "surfaces"),
     (WISHES, "wishes"),
@@ -167,7 +169,7 @@ FUNCTIONS: list[Callable] = [
     joint_plot,
     *(getattr(owner, name) for owner, names in MEMBERS for name in names.split()),
     lambda one, blocks: doe.join(CORNERS, one, blocks=blocks),
-    lambda emulators, curves: doe.fit_curves(emulators, [0.0], curves, 1.0, 1),
+    lambda emulators, curves: fit_curves(emulators, [0.0], curves, 1.0, 1),
 ]
 """All public functions, and the classes and methods that check what they are given."""
 
@@ -318,10 +320,10 @@ ANALYSES = [
     (lambda: climb("error_percent"), "'error_percent' names a column"),
 ]
 RULES = [
-    (lambda: doe.CurveEmulator.of(np.zeros((4, 2)), np.zeros((4, 5))), "must be 6 or more"),
-    (lambda: doe.CurveEmulator.of(np.zeros((8, 2)), np.zeros((7, 5))), "must have a row for each run"),
-    (lambda: doe.CurveEmulator.of(np.zeros((8, 2)), np.full((8, 5), np.nan)), "must be finite"),
-    (lambda: doe.fit_curves({}, [0.0], [], 1.0, 1), "must have at least one measured curve"),
+    (lambda: CurveEmulator.of(np.zeros((4, 2)), np.zeros((4, 5))), "must be 6 or more"),
+    (lambda: CurveEmulator.of(np.zeros((8, 2)), np.zeros((7, 5))), "must have a row for each run"),
+    (lambda: CurveEmulator.of(np.zeros((8, 2)), np.full((8, 5), np.nan)), "must be finite"),
+    (lambda: fit_curves({}, [0.0], [], 1.0, 1), "must have at least one measured curve"),
     (lambda: doe.ProfileSample.of(np.zeros((2, 9))), r"profiles: must be 3 rows or more, got shape \(2, 9\)"),
     (lambda: doe.ProfileSample.of(np.zeros(9)), "profiles: must be 3 rows or more"),
     (lambda: doe.ProfileSample.of(np.ones((4, 9))), "profiles: must scatter, got the same profile each time"),

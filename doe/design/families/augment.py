@@ -82,7 +82,7 @@ def foldover(design: Design, factors: Sequence[str] | None = None) -> Design:
 def add_center(design: Design, count: int) -> Design:
     """Return the design with center runs after its own (in every block, if it has blocks).
 
-    They show curvature (``screen`` and ``curvature_test``) and give an error without replicates of the rest.
+    They show curvature (``screen``) and give an error without replicates of the rest.
     """
     checked_kind("design", design, Design)
     numeric_factors(design.factors, "a center")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +12,19 @@ import numpy as np
 import pandas as pd
 
 import doe
-from doe import Category, Design, DesignError, Mixture, ScreenResult, Surface, Wish, plots
-from doe.response.analysis.formula import LinearFit
+from doe import (
+    Category,
+    ClimbPath,
+    Design,
+    DesignError,
+    Estimate,
+    LinearFit,
+    Mixture,
+    ScreenResult,
+    Surface,
+    Wish,
+    plots,
+)
 from experiments.commands.tables.sheet import Sheet, read_mixture
 
 if TYPE_CHECKING:
@@ -128,8 +140,43 @@ def _add_means(
     for x, trace in pairs:
         answer.add(
             f"interaction_{x}_{trace}", f"Means by {x} and {trace}.",
-            lambda x=x, trace=trace: plots.interaction_plot(design, values, x, trace, name),
+            partial(plots.interaction_plot, design, values, x, trace, name),
         )  # fmt: skip
+
+
+def climb_runs(sheet: Sheet, name: str, target: float) -> Answer:
+    """Show how far each run of a climb is from the target."""
+    design, values = sheet.observed(name)
+    table = doe.climb_table(design, values, target)
+    answer = Answer(f"Climb of {name} to {target:g}")
+    answer.tables["climb"] = "Runs of the climb.", table.rename_axis("run")
+    answer.notes.append(f"Run {table['error'].abs().idxmin()} is nearest to the target.")
+    answer.texts.append(table.to_string())
+    none = pd.Series(np.nan, index=design.coded.index)
+    path = ClimbPath(design.factors, design.points, predicted=none)
+    answer.add(
+        "climb", "Runs and target.", lambda: plots.climb_plot(path, values, target, response_label=name)
+    )
+    return answer
+
+
+def compare_columns(sheet: Sheet, value: str, reference: str) -> Answer:
+    """Compare a response with its reference, run by run."""
+    both = sheet.responses[[value, reference]].dropna()
+    result = doe.agreement(both[value], both[reference])
+    rows = {
+        "runs": result.runs, "bias": result.bias, "root mean square difference": result.rmse,
+        "slope": result.slope, "rank correlation": result.spearman,
+    }  # fmt: skip
+    estimates = {
+        name: vars(each) if isinstance(each, Estimate) else {"value": each} for name, each in rows.items()
+    }
+    table = pd.DataFrame.from_dict(estimates, orient="index").rename_axis("measure")
+    answer = Answer(f"{value} against {reference}", [table.to_string()])
+    answer.tables["agreement"] = f"Agreement of {value} with {reference}, with 95 % intervals.", table
+    groups = ["runs"] * len(both)
+    answer.add("agreement", "Run by run.", lambda: plots.agreement_plot(result, groups, value, reference))
+    return answer
 
 
 def fit_table(sheet: Sheet, name: str, model: Any, alpha: float, reduced: bool) -> tuple[Answer, Surface]:
@@ -142,6 +189,9 @@ def fit_table(sheet: Sheet, name: str, model: Any, alpha: float, reduced: bool) 
     answer.tables["anova"] = "Analysis of variance by term.", surface.anova
     answer.tables["anova_by_order"] = "Analysis of variance by order of the terms.", surface.anova_by_order
     answer.tables["quality"] = "Quality of the fit.", _fit_quality(surface)
+    answer.notes.append(
+        f"R2 {surface.r2:.4f}, adjusted {surface.r2_adjusted:.4f}, predicted {surface.r2_predicted:.4f}."
+    )
     _add_canonical(answer, surface, alpha)
     answer.add("influence", "Influence of each observation.", lambda: doe.influence(surface))
     _add_checks(answer, surface)
@@ -169,6 +219,7 @@ def _add_canonical(answer: Answer, surface: Surface, alpha: float) -> None:
         answer.notes.append(f"No canonical analysis: {error}.")
         return
     answer.texts.append(str(analysis))
+    answer.notes += str(analysis).splitlines()[:1] + list(analysis.notes)
     answer.tables["canonical"] = (
         "Canonical analysis: curvatures along the surface's own axes.",
         (analysis.table.join(analysis.axes.T).rename_axis("axis")),
@@ -179,7 +230,7 @@ def _add_canonical(answer: Answer, surface: Surface, alpha: float) -> None:
     for descend, text in ((False, "largest"), (True, "smallest")):
         answer.add(
             f"ridge_{text}", f"Ridge path to the {text} response.",
-            lambda descend=descend: doe.ridge_path(surface, RIDGE_RADII, descend=descend),
+            partial(doe.ridge_path, surface, RIDGE_RADII, descend=descend),
         )  # fmt: skip
 
 
@@ -226,8 +277,8 @@ def fit_mixture_table(path: Path, responses: Sequence[str], model: str) -> Answe
 def _linear_answer(linear: LinearFit, name: str) -> Answer:
     answer = Answer(f"Linear model of {name}", [linear.summary()])
     answer.tables["coefficients"] = "Coefficients.", linear.coefficient_table
-    answer.add("anova", "Analysis of variance.", lambda: linear.anova())
-    answer.add("robust", "Coefficients with robust standard errors.", lambda: linear.robust_table())
+    answer.add("anova", "Analysis of variance.", lambda: linear.anova)
+    answer.add("robust", "Coefficients with robust standard errors.", lambda: linear.robust_table)
     return answer
 
 
@@ -248,10 +299,18 @@ def best_setting(
     else:
         scales = {name: wish for name, wish in wishes.items() if isinstance(wish, Wish)}
         best = doe.most_desirable(surfaces, scales, **search)
+    best = replace(best, responses=best.responses.set_axis(list(surfaces)))
     answer = Answer("Best setting", [str(best)])
     setting = pd.DataFrame({"natural": best.natural, "coded": best.coded}).rename_axis("factor")
     answer.tables["setting"] = "The best setting.", setting
     answer.tables["responses"] = "Fitted responses there.", best.responses.rename_axis("response")
+    if isinstance(single, Wish) and single.target is not None and len(surfaces) == 1:
+        near = next(iter(surfaces.values())).nearest(single.target, extent=extent)
+        where = ", ".join(f"{name} = {value:.5g}" for name, value in near.items())
+        answer.texts.append(f"Nearest to the center, of all settings of the target: {where}.")
+        answer.tables["nearest"] = (
+            "The setting of the target nearest to the center.", near.rename_axis("factor").to_frame("natural"),
+        )  # fmt: skip
     point = dict(best.natural)
     answer.add("profile", "Profiles through it.", lambda: plots.profile_plot(surfaces, point, scales))
     if scales and len(best.natural) > 1:

@@ -63,14 +63,15 @@ def make_design(
     """
     if kind not in NAMES:
         raise InputError("KIND", f"must be a kind of design; {nearest_name(kind, list(NAMES))}", kind)
-    table, subject, place = next(
-        row for row in (
-            (KINDS, factors, "--factor"), (MIXTURES, components, "--component"), (ADDITIONS, before, "--table"),
-        ) if kind in row[0]
-    )  # fmt: skip
+    makers: tuple[tuple[Mapping[str, Callable[..., Any]], Any, str], ...] = (
+        (KINDS, factors, "--factor"),
+        (MIXTURES, components, "--component"),
+        (ADDITIONS, before, "--table"),
+    )
+    table, subject, place = next(row for row in makers if kind in row[0])
     if not subject:
         raise InputError(place, f"is needed by {kind}")
-    return table[kind](subject, **_options(kind, table[kind], options))  # type: ignore[operator]
+    return table[kind](subject, **_options(kind, table[kind], options))
 
 
 def _options(kind: str, make: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:

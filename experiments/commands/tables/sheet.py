@@ -13,7 +13,7 @@ import pandas as pd
 from doe import Category, Design, Factor, Mixture
 from experiments.io.errors import InputError
 from experiments.io.rows import Row, read_rows
-from experiments.io.texts import is_number, nearest_name
+from experiments.io.texts import is_number, nearest_name, number
 
 RUN = ("run", "std", "stdorder", "std order", "standard order")
 """Heads of the column with the runs' labels, in small letters."""
@@ -37,7 +37,7 @@ class Columns:
     """What the columns of a table are, as the options of a command say it."""
 
     factors: Sequence[str] = ()
-    """``NAME`` or ``NAME=LOW..HIGH UNIT``. Default: every column that is nothing else."""
+    """``NAME`` or ``NAME=LOW..HIGH UNIT``. Default: the columns before the responses."""
     responses: Sequence[str] = ()
     """Default: the last column."""
     block: str | None = None
@@ -81,7 +81,8 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     dummies = dummies or [name for name in frame.columns if DUMMY.fullmatch(name)]
     given = {text.partition("=")[0].strip(): text.partition("=")[2].strip() for text in columns.factors}
     taken = {block, run, *responses, *dummies}
-    rest = [name for name in frame.columns if name not in taken and name.lower() not in ORDER]
+    before = frame.columns[: min(map(list(frame.columns).index, responses))]
+    rest = [name for name in before if name not in taken and name.lower() not in ORDER]
     names = [_known(path, frame, name) for name in given] or rest
     if not names:
         raise InputError(str(path), "has no column left for a factor", ", ".join(frame.columns))
@@ -147,7 +148,7 @@ def _numbers(frame: pd.DataFrame, name: str, places: Sequence[Row]) -> pd.Series
     for row in places:
         if row[name] and not is_number(row[name]):
             raise row.error("must be a number, or empty", name)
-    return pd.to_numeric(frame[name].replace("", "nan")).astype(float)
+    return frame[name].map(lambda cell: number(cell) if cell else np.nan).astype(float)
 
 
 def _factor_column(frame: pd.DataFrame, name: str, places: Sequence[Row]) -> pd.Series:
@@ -186,16 +187,16 @@ def coded_levels(numbers: pd.DataFrame, name: str) -> tuple[float, float]:
     own = numbers.columns.get_loc(name)
     axial = np.delete(is_center, own, axis=1).all(axis=1) & ~is_center[:, own]
     column = numbers[name]
-    kept = column[~axial] if column[~axial].nunique() > 1 else column
+    kept = column[~axial] if np.ptp(column[~axial]) > 0.0 else column
     return float(kept.min()), float(kept.max())
 
 
 def read_factor(text: str, place: str = "--factor") -> Factor:
     """Read ``NAME=LOW..HIGH UNIT``, or the levels of a category ``NAME=one,two,three``."""
     name, _, levels = (part.strip() for part in text.partition("="))
-    if parts := LEVELS.fullmatch(levels):
-        if is_number(parts["low"], ",") and is_number(parts["high"], ","):
-            return Factor(name, float(parts["low"]), float(parts["high"]), parts["unit"].strip("[] "))
+    parts = LEVELS.fullmatch(levels)
+    if parts and is_number(parts["low"], ",") and is_number(parts["high"], ","):
+        return Factor(name, float(parts["low"]), float(parts["high"]), parts["unit"].strip("[] "))
     if "," in levels:
         return Category(name, levels=tuple(level.strip() for level in levels.split(",")))
     hint = "Write NAME=LOW..HIGH, NAME=LOW..HIGH UNIT, or NAME=one,two for a category."

@@ -5,7 +5,8 @@ from functools import cache
 import numpy as np
 from scipy.stats import qmc
 
-from doe import CurveEmulator, CurveFit, MeasuredCurve, fit_curves
+from doe.curves.curve_emulator import CurveEmulator
+from doe.curves.curve_fit import CurveFit, MeasuredCurve, fit_curves
 
 PLACES = np.linspace(-40.0, 40.0, 41)
 SPEEDS = {"slow": np.log(15.0), "between": np.log(30.0), "fast": np.log(45.0)}

@@ -6,8 +6,7 @@ from scipy import stats
 from statsmodels.stats.power import TTestIndPower
 
 import doe
-from doe import Sample, central_composite, curvature_test, detectable_effect, effect_power, fit_surface
-from doe.design.factors import Factor
+from doe import Sample, detectable_effect, effect_power
 
 
 def test_noise_floor_of_five_by_tables():
@@ -19,17 +18,6 @@ def test_noise_floor_of_five_by_tables():
     assert floor.sd_interval == pytest.approx(
         (2.0 * np.sqrt(4.0 / 11.1433), 2.0 * np.sqrt(4.0 / 0.4844)), rel=1e-4
     )
-
-
-def test_curvature_is_the_lack_of_fit_of_a_plane_with_centers():
-    design = central_composite([Factor("A", 0.0, 1.0), Factor("B", 0.0, 1.0)], center=4)
-    runs = design.select([1, 2, 3, 4, 9, 10, 11, 12])
-    response = np.random.default_rng(42).normal(size=8)
-    test = curvature_test(response[:4], response[4:])
-    # Corners with interaction fit four means: what is left over the centers' spread is curvature alone.
-    lack = fit_surface(runs, response, "interaction").anova.loc["lack of fit"]
-    assert (test.F, test.p) == pytest.approx((lack["F"], lack["p"]), rel=1e-9)
-    assert test.df == (1.0, 3.0)
 
 
 def test_power_is_that_of_a_two_sample_test():

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from doe import CurveEmulator, CurveFit, MeasuredCurve, fit_curves
+from doe.curves.curve_emulator import CurveEmulator
+from doe.curves.curve_fit import CurveFit, MeasuredCurve, fit_curves
 from experiments.evidence.studies.cellulose.cellulose_plan import (
     EVERY,
     HELD_BACK,

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from doe import CurveEmulator, Sample
+from doe import Sample
 from doe.curves.compatible import compatible_points, even_points
+from doe.curves.curve_emulator import CurveEmulator
 from experiments.evidence.studies.wheat_drums.drum_plan import GRAIN, INCLINED, SHELLS, UPRIGHT, coded
 from experiments.studyfile import Study
 
