@@ -11,6 +11,7 @@ from importlib import import_module
 from itertools import groupby, pairwise
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import typer
 from typer.main import get_command
@@ -65,20 +66,29 @@ def commands_page() -> str:
     codes = "0 done, 1 a run that failed, 2 bad input, 130 interrupted, 143 ended by a scheduler"
     parts = ["# The command line", f"Every command has `--help`. Exit codes: {codes}."]
     group = get_command(app)
-    context = typer.Context(group, info_name="dem-warp")
+    return "\n\n".join([*parts, *_commands(group, typer.Context(group, info_name="dem-warp"))])
+
+
+def _commands(group: Any, context: typer.Context) -> list[str]:
+    """Describe the commands of a group, and those of its groups."""
+    parts = []
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         inner = typer.Context(command, info_name=name, parent=context)
+        if hasattr(command, "list_commands"):
+            parts += _commands(command, inner)
+            continue
         # typer puts what is required into braces
         usage = re.sub("[{}]", "", command.get_usage(inner).removeprefix("Usage: "))
-        parts += [f"## dem-warp {name}", command.help or "", f"`{usage}`"]
-        rows = []
-        for parameter in command.get_params(inner):
-            record = parameter.get_help_record(inner)
-            if record and parameter.name != "help":
-                rows.append((f"`{record[0].strip()}`", record[1]))
+        parts += [f"## {inner.command_path}", command.help or "", f"`{usage}`"]
+        records = [
+            parameter.get_help_record(inner)
+            for parameter in command.get_params(inner)
+            if parameter.name != "help"
+        ]
+        rows = [(f"`{record[0].strip()}`", record[1]) for record in records if record]
         parts.append(markdown_table(("option", "meaning"), rows))
-    return "\n\n".join(parts)
+    return parts
 
 
 def observables_page() -> str:

@@ -127,7 +127,10 @@ def parsed(words: list[str]) -> None:
         return
     command = COMMANDS.get_command(group, words[0])
     assert command is not None, f"no command is named {words[0]}"
-    command.make_context(words[0], words[1:], parent=group)
+    context = command.make_context(words[0], words[1:], parent=group)
+    if hasattr(command, "resolve_command"):
+        _, command, rest = command.resolve_command(context, words[1:])
+        command.make_context(words[1], rest, parent=context)
 
 
 SHELL = [block for block in BLOCKS if block.is_shell]
@@ -153,10 +156,12 @@ def test_commands_and_options_in_a_sentence_exist(page: Path) -> None:
     text = FENCED.sub("", page.read_text(encoding="utf-8"))
     group = typer.Context(COMMANDS, info_name="dem-warp")
     names = COMMANDS.list_commands(group)
+    commands = [COMMANDS.get_command(group, name) for name in names]
+    commands += [each for command in commands for each in getattr(command, "commands", {}).values()]
     known = {"--help", "--version"} | {
         option
-        for name in names
-        for parameter in COMMANDS.get_command(group, name).params
+        for command in commands
+        for parameter in command.params
         for option in (*parameter.opts, *parameter.secondary_opts)
     }
     for quoted in re.findall(r"`(dem-warp [^`]+|--[^`]+)`", text):

@@ -1,4 +1,4 @@
-"""What the commands of ``dem-warp doe`` answer: texts, tables and plots."""
+"""Answers of ``dem-warp doe``: texts, tables and plots."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ class Answer:
     title: str
     texts: list[str] = field(default_factory=list)
     tables: dict[str, tuple[str, pd.DataFrame]] = field(default_factory=dict)
-    """By name: caption and table."""
+    """Captions and tables, by name."""
     plots: dict[str, tuple[str, Figure]] = field(default_factory=dict)
-    """By name: caption and figure."""
+    """Captions and figures, by name."""
     notes: list[str] = field(default_factory=list)
 
     def add(self, name: str, caption: str, make: Callable[[], Any]) -> None:
@@ -305,12 +305,13 @@ def best_setting(
     answer.tables["setting"] = "The best setting.", setting
     answer.tables["responses"] = "Fitted responses there.", best.responses.rename_axis("response")
     if isinstance(single, Wish) and single.target is not None and len(surfaces) == 1:
-        near = next(iter(surfaces.values())).nearest(single.target, extent=extent)
-        where = ", ".join(f"{name} = {value:.5g}" for name, value in near.items())
-        answer.texts.append(f"Nearest to the center, of all settings of the target: {where}.")
-        answer.tables["nearest"] = (
-            "The setting of the target nearest to the center.", near.rename_axis("factor").to_frame("natural"),
+        surface, target = next(iter(surfaces.values())), single.target
+        answer.add(
+            "nearest", "Nearest to the center, of all settings of the target.",
+            lambda: surface.nearest(target, extent=extent).rename_axis("factor").to_frame("natural"),
         )  # fmt: skip
+        if near := answer.tables.get("nearest"):
+            answer.texts.append(f"{near[0]}\n{near[1].to_string()}")
     point = dict(best.natural)
     answer.add("profile", "Profiles through it.", lambda: plots.profile_plot(surfaces, point, scales))
     if scales and len(best.natural) > 1:

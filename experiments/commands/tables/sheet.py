@@ -34,7 +34,7 @@ class _Any(tuple[str, ...]):
 
 @dataclass(frozen=True)
 class Columns:
-    """What the columns of a table are, as the options of a command say it."""
+    """Columns of a table, as the options of a command name them."""
 
     factors: Sequence[str] = ()
     """``NAME`` or ``NAME=LOW..HIGH UNIT``. Default: the columns before the responses."""
