@@ -227,7 +227,7 @@ def run_cases(
         When the table has no seeds, or a column that this function adds.
     """
     _check_columns(table)
-    cases, refused = _build_cases(study, table)
+    cases, refused = build_cases(study, table)
     keys = [store.key(case) if case else "" for case in cases]
     by_key = {key: case for key, case in zip(keys, cases, strict=True) if case}
     scenes = dict(zip(keys, _scene_names(table), strict=True))
@@ -277,7 +277,7 @@ def _check_columns(table: pd.DataFrame) -> None:
         raise ValueError(f"a table of cases must not have the columns of its results: {', '.join(taken)}")
 
 
-def _build_cases(study: Study, table: pd.DataFrame) -> tuple[list[Case | None], list[str]]:
+def build_cases(study: Study, table: pd.DataFrame) -> tuple[list[Case | None], list[str]]:
     """Build every row's case; a row that breaks a physical rule has no case, and the reason instead."""
     names = [factor.name for factor in study.factors if factor.name in table.columns]
     rows = zip(table[names].to_dict("records"), table["seed"], _scene_names(table), strict=True)

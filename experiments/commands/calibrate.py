@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from typing import Annotated
 
 import typer
 
@@ -21,6 +23,13 @@ def calibrate(
     study: StudyFile = None,
     dry_run: DryRun = False,
     live: Live = False,
+    by_hand: Annotated[
+        bool,
+        typer.Option(
+            "--by-hand",
+            help="Write sheets of runs to simulate in another program, and wait for the results.",
+        ),
+    ] = False,
     as_json: AsJson = False,
     *,
     asked: RunRequest,
@@ -29,6 +38,7 @@ def calibrate(
     with clear_errors():
         from experiments.runs.choices import check_campaign, prepare
 
+        asked = replace(asked, engine="hand") if by_hand else asked
         prepared = prepare(study, asked, check_campaign)
         if dry_run:
             from experiments.runs.plan import plan_calibration
@@ -37,9 +47,14 @@ def calibrate(
     advice = Attempt.of("calibrate", study, **options_of(prepared), live=live, json=as_json)
     with clear_errors(advice), live_page(prepared.folder, live, messages.print):
         from experiments.runs.calibration import run_calibration
+        from experiments.runs.request import AwaitingRuns
 
         print_study(prepared.study, prepared.resources)
-        ended = run_calibration(prepared, show_stage)
+        try:
+            ended = run_calibration(prepared, show_stage)
+        except AwaitingRuns as waiting:
+            messages.print(f"{waiting} {advice}")
+            return
     if as_json:
         typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
     messages.print(f"{ended.campaign.outcome}: {ended.campaign.reason}")

@@ -81,7 +81,7 @@ def run_campaign(run: Run, on_stage: StageHook | None = None) -> Campaign:
         "engine": run.store.load(key).provenance if run.store.has(key) else {},
     }
     with run.publishing() as drafts:
-        pictures = heap_pictures(campaign, run.study, run.store.load)
-        solid = verified_heap(campaign, run.store.load)
+        pictures = [] if run.is_by_hand else heap_pictures(campaign, run.study, run.store.load)
+        solid = None if run.is_by_hand else verified_heap(campaign, run.store.load)
         write_report(campaign, run.study, drafts, pictures, provenance, solid=solid)
     return campaign

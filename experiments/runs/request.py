@@ -16,6 +16,10 @@ Watch = Callable[[str], AbstractContextManager["OnProgress | None"]]
 """Opens the display of one batch of cases, by its title; the block's value is called with the progress."""
 
 
+class AwaitingRuns(Exception):  # noqa: N818  (nothing is wrong)
+    """A campaign waits for runs that a person does; its text says where."""
+
+
 class RunOptions(TypedDict, total=False):
     """Keywords of `experiments.api` that every run accepts: the fields of `RunRequest`."""
 

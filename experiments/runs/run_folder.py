@@ -63,6 +63,11 @@ class Run:
     simulated: list[float] = field(default_factory=list)
     """Time from the start of each batch to its last progress [s]."""
 
+    @property
+    def is_by_hand(self) -> bool:
+        """True if a person simulates the cases."""
+        return self.study.engine is not None and self.study.engine.by is not None
+
     @contextmanager
     def batch(self, title: str, kept: Callable[[], int]) -> Iterator[OnProgress]:
         """Show a batch of cases and note it in the journal; the block's value takes its progress.
@@ -100,6 +105,11 @@ class Run:
 
     def run_cases(self, table: pd.DataFrame, title: str) -> pd.DataFrame:
         """Simulate the cases of a table that are not stored yet, as one batch, and measure all of them."""
+        if self.is_by_hand:
+            # few studies are; what reads their sheets takes a second to load
+            from experiments.runs.by_hand import typed_cases
+
+            return typed_cases(self.study, table, self.folder, title, self.store)
         with self.batch(title, lambda: len(self.store)) as progress:
             return run_cases(self.study, table, self.store, self.workers, progress, self.journal)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -17,6 +17,8 @@ class EngineSection(Section):
     """Name of an engine that ships (liggghts, lammps, yade) or that an installed package adds."""
     command: str | None = None
     """Command of any other program, which is started in the folder of a case; no shell reads it."""
+    by: Literal["hand"] | None = None
+    """``"hand"``: a person simulates the cases in any program, and types in what comes out."""
     approximate: bool = False
     """Take the nearest for what an engine that ships lacks, as dem-warp export --approximate does."""
     version: str = ""
@@ -37,8 +39,8 @@ class EngineSection(Section):
 
     @model_validator(mode="after")
     def _is_one(self) -> Self:
-        if (self.name is None) == (self.command is None):
-            raise ValueError("must have a name or a command, not both")
+        if sum(each is not None for each in (self.name, self.command, self.by)) != 1:
+            raise ValueError('must have a name, a command or by = "hand", and no two of them')
         return self
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from dem_warp import Case, CaseResult
 from dem_warp.registry import Registry
 from experiments.cases.engines.contract import command_program
 from experiments.cases.engines.driver import Driver
@@ -15,6 +17,9 @@ from experiments.io.errors import InputError, StudyError
 from experiments.studyfile import Study
 from experiments.studyfile.engine_section import EngineSection, quoted
 from experiments.studyfile.solver_section import CARD_SOLVER, OWN_SOLVER
+
+HAND = "hand"
+"""Engine of a person."""
 
 
 def _check(name: str, engine: object, known: object) -> None:
@@ -26,6 +31,19 @@ _DRIVERS = {name: ProgramEngine(Driver(name)) for name in ("liggghts", "lammps",
 
 ENGINES: Registry[Engine] = Registry("dem_warp.engines", _DRIVERS, _check)
 """Engines by name: drivers of other codes, and those of installed packages."""
+
+
+@dataclass(frozen=True)
+class _Person:
+    """A person who simulates cases in another program: a campaign writes sheets of them."""
+
+    identity: str = "by hand"
+
+    def __call__(self, cases: Sequence[Case], *others: Any, **options: Any) -> list[CaseResult]:
+        raise InputError("engine.by", "a person simulates this study's cases; only calibrate waits for them")
+
+
+BY_HAND = _Person()
 
 
 def with_engine(study: Study, name: str | None = None, command: str | None = None, **limits: Any) -> Study:
@@ -40,15 +58,15 @@ def with_engine(study: Study, name: str | None = None, command: str | None = Non
         return study
     if name is not None and command is not None:
         raise InputError("engine", "cannot have both a name and a command", f"{name}; {command}")
-    if name is not None and name not in ENGINES:
+    if name is not None and name not in (*ENGINES, HAND):
         raise InputError("engine", f"must be one of {', '.join(ENGINES) or 'none'}", name)
     own = study.document.get("engine", {})
-    kept = {key: value for key, value in own.items() if key not in ("name", "command")}
+    kept = {key: value for key, value in own.items() if key not in ("name", "command", "by")}
     if command is not None:
         words = command_program(command, Path.cwd(), "--command").words
         chosen = {"command": " ".join(map(quoted, words))}
     else:
-        chosen = {"name": str(name)}
+        chosen = {"by": HAND} if name == HAND else {"name": str(name)}
     given = {key: value for key, value in limits.items() if value is not None}
     return study.with_engine(kept | chosen | given)
 
@@ -64,6 +82,8 @@ def engine_of(study: Study) -> Engine | None:
     if section is None:
         solver.check_solver(OWN_SOLVER, solver_place)
         return None
+    if section.by is not None:
+        return BY_HAND
     if section.command is not None:
         declared = dict.fromkeys(name for scene in study.scenes.values() for name in scene.observables)
         _check_observables(section.observables, list(declared), f"{place}.observables")

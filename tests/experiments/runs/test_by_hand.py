@@ -1,0 +1,128 @@
+"""A campaign whose runs a person simulates: sheets out, numbers in, and what is refused."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from commandline import dem_warp
+
+from doe import Design, Factor, fit_surface
+from experiments.studies.buckwheat.paper import published
+
+STUDY = Path(__file__).parents[3] / "experiments" / "studies" / "buckwheat"
+PRINTED = "repose_angle_deg"
+PAPER = {
+    "# start = ": "start = ", "# step = ": "step = ", "# drop = ": "drop = ",
+    'center_rule = "crossing"': 'center_rule = "smallest-error"', 'alpha = "rotatable"': "alpha = 1.414",
+    "steps = 6\nreplicates = 2": "steps = 6\nreplicates = 1",
+}  # fmt: skip
+"""The paper's decisions, which its study has as comments."""
+
+
+@pytest.fixture
+def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    text = (STUDY / "study.toml").read_text(encoding="utf-8")
+    for before, after in PAPER.items():
+        assert before in text
+        text = text.replace(before, after, 1)
+    for name in ("clump.txt", "clumps"):
+        (shutil.copytree if (STUDY / name).is_dir() else shutil.copy)(STUDY / name, name)
+    path = Path("paper.toml")
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def step(study: Path, *words: str) -> tuple[int, str]:
+    code, _, said = dem_warp("calibrate", study, "--scale", "paper", "--by-hand", "--out", "run", *words)
+    return code, said
+
+
+def last_sheet() -> Path:
+    return max(Path("run/by-hand").glob("*.csv"))
+
+
+def fill(sheet: Path) -> None:
+    """Type in the printed angles; a screening that the paper does not have gets its half effects."""
+    head = "".join(
+        line for line in sheet.read_text(encoding="utf-8").splitlines(True) if line.startswith("#")
+    )
+    runs = pd.read_csv(sheet, comment="#", dtype=str)
+    e, f = runs["E [1]"].astype(float), runs["F [1]"].astype(float)
+    composite, climb = published("central_composite"), published("steepest_climb")
+    around = 0.48 + 0.06 * composite["E_coded"], 0.45 + 0.10 * composite["F_coded"]
+    printed = {
+        "steepest": pairs(climb["E"], climb["F"], climb[PRINTED]),
+        "surface": pairs(*around, composite[PRINTED]),
+    }
+    stage = runs["stage"].iloc[0]
+    if stage in ("noise_floor", "screening"):
+        noise = np.random.default_rng(5).normal(0.0, 0.3, len(runs))
+        angles = 20.0 + 8.0 * (e - e.mean()) + 30.0 * (f - f.mean()) + noise
+    elif stage == "verification":
+        angles = pd.Series(np.resize(published("verification")[PRINTED], len(runs)))
+    else:
+        left = printed["surface" if stage == "surface" else "steepest"]
+        angles = pd.Series([left[round(x, 4), round(y, 4)].pop(0) for x, y in zip(e, f, strict=True)])
+    sheet.write_text(head + runs.assign(**{"angle [deg]": angles}).to_csv(index=False), encoding="utf-8")
+
+
+def pairs(e: pd.Series, f: pd.Series, angles: pd.Series) -> dict[tuple[float, float], list[float]]:
+    found: dict[tuple[float, float], list[float]] = {}
+    for x, y, angle in zip(e, f, angles, strict=True):
+        found.setdefault((round(x, 4), round(y, 4)), []).append(float(angle))
+    return found
+
+
+def test_the_printed_angles_typed_in_give_the_papers_surface(study: Path) -> None:
+    """Every stage waits with exit code 0; no simulator is asked for anything."""
+    code, said = step(study)
+    for _ in range(9):
+        assert code == 0, said
+        if Path("run/report.html").is_file():
+            break
+        assert "fill in its last columns, and resume" in said
+        fill(last_sheet())
+        code, said = step(study, "--resume")
+    results = json.loads(Path("run/results.json").read_text(encoding="utf-8"))
+    table = published("central_composite")
+    coded = table[["E_coded", "F_coded"]].set_axis(["E", "F"], axis=1)
+    factors = [Factor.around("E", 0.48, 0.06), Factor.around("F", 0.45, 0.10)]
+    ours = fit_surface(Design.from_table(coded, factors, coded=True), table[PRINTED])
+    found = pd.DataFrame(results["campaign"]["surface"]["responses"]["angle"]["full"]["anova"])
+    # A sheet has ten digits of each setting.
+    pd.testing.assert_frame_equal(found.set_index("source"), ours.anova, rtol=1e-6, check_names=False)
+    assert (Path("run/by-hand/edem/values.csv")).is_file()
+    assert "EDEM: E = Coefficient of Static Friction of grain with grain" in last_sheet().read_text(
+        encoding="utf-8"
+    )
+
+
+def test_a_sheet_that_is_not_as_it_was_written_is_refused(study: Path) -> None:
+    step(study)
+    sheet = last_sheet()
+    empty = sheet.read_text(encoding="utf-8")
+    assert step(study, "--resume")[0] == 0  # nothing is filled in yet
+    fill(sheet)
+    filled = sheet.read_text(encoding="utf-8")
+    lines = filled.splitlines()
+    for wrong, message in [
+        ("\n".join([*lines[:-1], empty.splitlines()[-1]]), "has no result yet for run 12 repeat 1"),
+        (filled.replace(",0.29,", ",0.3,", 1), "A [1]: must stay as the campaign wrote it, 0.29, got 0.3"),
+        ("\n".join([*lines[:-1], lines[-1].rsplit(",", 2)[0] + ",steep,"]), "must be a number, got steep"),
+        ("\n".join([*lines[:-1], lines[-1].rsplit(",", 2)[0] + ",,heap.png"]), "picture: shows no angle"),
+    ]:
+        sheet.write_text(wrong + "\n", encoding="utf-8")
+        code, said = step(study, "--resume")
+        assert code == 2
+        assert message in said
+        assert not Path("run/report.html").exists()
+
+
+def test_only_a_campaign_waits_for_a_person(study: Path) -> None:
+    code, _, said = dem_warp("heap", study, "--scale", "bench", "--engine", "hand", "--out", "one")
+    assert code == 2
+    assert "only calibrate waits" in said
