@@ -36,6 +36,8 @@ DIVERGING = replace(
 )
 """With four times the usual step the explicit damping of almost plastic impacts overshoots."""
 
+CASE = small_case(scene=replace(SMALL_TUBE, grain_count=20))  # fewer grains
+
 ENDLESS = [small_case(seed, replace(SMALL_TUBE, duration=3600.0)) for seed in (1, 2)]
 """Cases whose end no test waits for."""
 
@@ -56,7 +58,7 @@ def handful(seed: int) -> Case:
 @pytest.fixture(scope="module")
 def alone() -> tuple[CaseResult, dict[str, np.ndarray]]:
     """Return result and final state of the small case by itself and never interrupted."""
-    batch = start(small_case())
+    batch = start(CASE)
     return worlds.finish(batch)[0], state(batch.solver)
 
 
@@ -64,7 +66,7 @@ def alone() -> tuple[CaseResult, dict[str, np.ndarray]]:
 def left(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return a folder for each phase in which the small case was left, with its checkpoint."""
     folder = tmp_path_factory.mktemp("running")
-    batch, folders = start(small_case(), folder=folder), {}
+    batch, folders = start(CASE, folder=folder), {}
     while "lift" not in folders:
         batch.advance()
         phase = batch.phase(0)
@@ -99,7 +101,7 @@ def without_mark(result: CaseResult) -> CaseResult:
 
 @pytest.mark.parametrize("phase", ["fill", "lift"])
 def test_a_case_that_was_left_in_any_phase_ends_in_the_same_bits(alone, left, phase):
-    batch = start(small_case(), folder=left[phase])
+    batch = start(CASE, folder=left[phase])
     assert batch.steps[0] > 0
     assert batch.phase(0) == phase
     assert_same_result(worlds.finish(batch)[0], alone[0])
@@ -152,19 +154,19 @@ def test_an_interrupted_simulation_goes_on(alone, tmp_path, monkeypatch):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        simulate([small_case()], on_progress=interrupt, **settings)
-    marked(tmp_path, small_case())
-    [result] = simulate([small_case()], **settings)
+        simulate([CASE], on_progress=interrupt, **settings)
+    marked(tmp_path, CASE)
+    [result] = simulate([CASE], **settings)
     assert_same_result(without_mark(result), alone[0])
     assert list(tmp_path.iterdir()) == []
 
 
 def test_processes_take_up_their_cases(alone, left, tmp_path):
     shutil.copytree(left["lift"], tmp_path, dirs_exist_ok=True)
-    marked(tmp_path, small_case())
+    marked(tmp_path, CASE)
     ended = []
     results = simulate(
-        [handful(5), small_case()],
+        [handful(5), CASE],
         device=DEVICE,
         workers=2,
         on_result=lambda index, _: ended.append((index, len(list(tmp_path.iterdir())))),
@@ -184,8 +186,8 @@ def test_a_result_that_could_not_be_kept_leaves_its_checkpoint(left, tmp_path):
         raise OSError("no space left on device")
 
     with pytest.raises(OSError, match="no space"):
-        simulate([small_case()], device=DEVICE, workers=1, on_result=full, checkpoint=tmp_path)
-    assert start(small_case(), folder=tmp_path).steps[0] > 0
+        simulate([CASE], device=DEVICE, workers=1, on_result=full, checkpoint=tmp_path)
+    assert start(CASE, folder=tmp_path).steps[0] > 0
 
 
 def cut(path: Path) -> None:
@@ -209,11 +211,11 @@ def test_a_damaged_checkpoint_is_named_and_only_its_case_starts_afresh(left, tmp
     other = start(handful(5), folder=tmp_path, every=ALWAYS)
     other.advance()
     with caplog.at_level(logging.WARNING):
-        batch = start(handful(5), small_case(), folder=tmp_path)
+        batch = start(handful(5), CASE, folder=tmp_path)
     assert batch.steps == [other.steps[0], 0]
-    assert str(Checkpoints(tmp_path).path(small_case())) in caplog.text
+    assert str(Checkpoints(tmp_path).path(CASE)) in caplog.text
     assert "starts again: the file is damaged" in caplog.text
-    assert_same_bits(take_snapshot(batch.solver, 1), take_snapshot(start(small_case()).solver, 0))
+    assert_same_bits(take_snapshot(batch.solver, 1), take_snapshot(start(CASE).solver, 0))
 
 
 @pytest.mark.parametrize(
@@ -227,14 +229,14 @@ def test_a_damaged_checkpoint_is_named_and_only_its_case_starts_afresh(left, tmp
 def test_a_checkpoint_of_another_maker_is_not_used(left, caplog, monkeypatch, module, name, value, reason):
     monkeypatch.setattr(module, name, value)
     with caplog.at_level(logging.WARNING):
-        assert start(small_case(), folder=left["fill"]).steps == [0]
+        assert start(CASE, folder=left["fill"]).steps == [0]
     assert caplog.messages[0].startswith(str(the_file(left["fill"])))
     assert re.search(reason, caplog.text)
 
 
 def test_a_checkpoint_is_that_of_its_case_alone(left):
-    wide = replace(small_case(), numerics=replace(small_case().numerics, skin=1.6e-3))
-    for other in (small_case(seed=2), small_case(time_step_fraction=0.2), wide):
+    others = (replace(CASE.numerics, **one) for one in ({"skin": 1.6e-3}, {"time_step_fraction": 0.2}))
+    for other in (replace(CASE, seed=2), *(replace(CASE, numerics=numerics) for numerics in others)):
         assert start(other, folder=left["fill"]).steps == [0]
 
 

@@ -1,7 +1,9 @@
 """Conformance tests of dem_warp's own laws and scenes."""
 
+from dataclasses import replace
+
 import pytest
-from worlds import STEEL, ball_case, small_case
+from worlds import SMALL_TUBE, STEEL, ball_case, small_case
 
 from dem_warp import testing
 from dem_warp.laws.library import MECHANISMS
@@ -25,10 +27,10 @@ PARAMETERS = {
 }
 LAWS = [kind(**PARAMETERS[name]) for name, kind in MECHANISMS.items()]
 CASES = {
-    "lifted-cylinder": small_case(),
-    "hopper": ball_case(Hopper(0.03, 0.03, 0.016, STEEL, rain_rate=3000.0), 0.3),
+    "lifted-cylinder": small_case(scene=replace(SMALL_TUBE, grain_count=20)),
+    "hopper": ball_case(Hopper(0.025, 0.02, 0.016, STEEL, rain_rate=3000.0), 0.3),
     "drum": ball_case(Drum(0.06, 0.012, STEEL, 2.0, filling=0.3, start_up=0.2, revolutions=0.3), 0.4, 0.05),
-    "draw-down": ball_case(DrawDown(0.05, 0.012, 0.02, 0.018, 0.03, STEEL), 0.3),
+    "draw-down": ball_case(DrawDown(0.04, 0.009, 0.015, 0.016, 0.025, STEEL, rest_speed=3e-3), 0.3, 0.1),
 }
 names = {"ids": lambda one: getattr(one, "name", None) or one.__name__}
 

@@ -15,8 +15,10 @@ from worlds import SMALL_TUBE, assert_same_result, small_case
 
 from dem_warp import CaseResult, Processes, Progress, simulate
 from dem_warp.batch import Batch
+from dem_warp.processes import LOSSES
 
-CASES = [small_case(seed, replace(SMALL_TUBE, grain_count=4)) for seed in (1, 2, 3)]
+CASES = [small_case(seed, replace(SMALL_TUBE, grain_count=4)) for seed in (1, 2)]
+CASES.append(small_case(skin=1000.0))  # one that cannot be
 
 
 @pytest.fixture(scope="module")
@@ -58,47 +60,38 @@ def signed(folder: Path, processes: Processes) -> set[str]:
 def test_processes_stay_from_call_to_call_with_the_same_bits_and_end_with_their_block(
     alone: list[CaseResult], tmp_path: Path
 ) -> None:
-    before = multiprocessing.active_children()
+    other = multiprocessing.get_context("spawn").Process(target=signal.pause)
+    other.start()
     seen: list[Progress] = []
     with Processes(2) as processes:
-        assert multiprocessing.active_children() == before
+        assert multiprocessing.active_children() == [other]
         first, second = (signed(tmp_path / name, processes) for name in ("first", "second"))
         assert len(first | second) <= 2
         again = simulate(CASES[::-1], "cpu", processes, on_progress=seen.append)[::-1]
-    assert multiprocessing.active_children() == before
-    for one, other in zip(alone, again, strict=True):
-        assert_same_result(one, other)
+        # One that is lost between two calls is replaced, and the processes of others are left alone.
+        os.kill(int(min(first | second)), signal.SIGKILL)
+        assert signed(tmp_path / "third", processes) - (first | second)
+    assert multiprocessing.active_children() == [other]
+    other.terminate()
+    other.join()
+    for one, found in zip(alone, again, strict=True):
+        assert_same_result(one, found)
     assert seen[0].total == seen[-1].done == len(CASES)
     assert seen[0].fraction < seen[-1].fraction == 1.0
 
 
-def test_the_cases_of_a_lost_process_go_on_in_another_one(alone: list[CaseResult], tmp_path: Path) -> None:
-    ended: list[int] = []
-    found = simulate(CASES, "cpu", 2, lambda index, _: ended.append(index), on_advance=Loss(tmp_path, 2))
-    assert sorted(ended) == [0, 1, 2]
-    for one, other in zip(alone, found, strict=True):
-        assert_same_result(one, other)
-
-
-def test_a_call_whose_processes_are_lost_again_and_again_is_given_up(tmp_path: Path) -> None:
-    with Processes(2) as processes:
-        with pytest.raises(BrokenProcessPool, match="lost repeatedly"):
-            simulate(CASES, "cpu", processes, on_advance=Loss(tmp_path, 100))
-        assert {result.status for result in simulate(CASES, "cpu", processes)} == {"finished"}
-
-
-def test_a_process_that_is_lost_between_two_calls_is_replaced_and_others_are_left_alone(
-    tmp_path: Path,
+def test_a_call_whose_processes_are_lost_repeatedly_is_given_up_and_others_go_on_in_another_one(
+    alone: list[CaseResult], tmp_path: Path
 ) -> None:
-    other = multiprocessing.get_context("spawn").Process(target=signal.pause)
-    other.start()
-    with Processes(2) as processes:
-        first = signed(tmp_path / "first", processes)
-        os.kill(int(min(first)), signal.SIGKILL)
-        assert signed(tmp_path / "second", processes) - first
-    assert other.is_alive()
-    other.terminate()
-    other.join()
+    found: dict[int, CaseResult] = {}
+    loss = Loss(tmp_path, LOSSES + 1)
+    with Processes(1) as processes:
+        with pytest.raises(BrokenProcessPool, match="lost repeatedly"):
+            processes.run(CASES, found.__setitem__, lambda *_: None, on_advance=loss)
+        assert not found
+        processes.run(CASES, found.__setitem__, lambda *_: None, on_advance=loss)
+    for number, one in enumerate(alone):
+        assert_same_result(one, found[number])
 
 
 @pytest.mark.parametrize(("head", "said"), [("", "needs if __name__ == "), ("__name__\n", "")])

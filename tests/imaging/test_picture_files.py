@@ -68,12 +68,12 @@ def with_focal_length(path: Path, picture: np.ndarray, film: int, taken: tuple[i
 
 
 def test_a_near_camera_is_corrected_by_its_focal_length(tmp_path: Path) -> None:
-    picture = draw(DrawnHeap(30, 30), Camera(plate=(90, 90, 90), margin=0.8))
+    picture = draw(DrawnHeap(30, 30, 200), Camera(plate=(90, 90, 90), margin=0.8))
     size = picture.shape[1::-1]
     path = with_focal_length(tmp_path / "phone.jpg", picture, 26, size)
     assert focal_length(path) == pytest.approx(26.0 / FILM_DIAGONAL * np.hypot(*size), rel=1e-6)
     near = measure_photograph(path)
-    # The heap is 400 of 1040 pixels wide: the camera was 1 or 2 heap widths away and saw it flatter.
+    # The heap is 200 of 520 pixels wide: the camera was 1 or 2 heap widths away and saw it flatter.
     assert 1.0 < near.outline.distance < 2.0
     assert near.mean > measure_photograph(save_picture(tmp_path / "plain.png", picture)).mean + 0.5
     # Cut to another size than the camera's, a picture no longer has its angle of view.

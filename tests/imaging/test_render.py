@@ -15,18 +15,21 @@ from imaging.drawing import opengl
 from imaging.geometry import Frame, Spheres
 
 
-@pytest.mark.parametrize("backend", ["raster", "pyvista"])
-def test_one_sphere_is_a_disc_of_its_size_at_its_place(backend: str) -> None:
+def centre_of(dark: np.ndarray) -> np.ndarray:
+    """Return row and column of the middle of what a picture shows dark."""
+    return (np.mgrid[: dark.shape[0], : dark.shape[1]] * dark).sum(axis=(1, 2)) / dark.sum()
+
+
+def test_one_sphere_is_a_disc_of_its_size_at_its_place() -> None:
     center, radius = np.array([[0.02, -0.01, 0.004]]), np.array([0.004])
-    picture = silhouette(center, radius, azimuth=0.7, pixels=200, backend=backend)
+    picture = silhouette(center, radius, azimuth=0.7, pixels=200, backend="raster")
     dark = (255.0 - picture.image) / 255.0
     scale = picture.meters_per_pixel
     # 4 x 4 subpixels on a disc of 180 pixels diameter: its area to about a thousandth.
     assert dark.sum() * scale**2 == pytest.approx(np.pi * radius[0] ** 2, rel=3e-3)
-    rows, columns = np.mgrid[0 : dark.shape[0], 0 : dark.shape[1]]
-    assert (dark * columns).sum() / dark.sum() == pytest.approx(0.5 * dark.shape[1] - 0.5, abs=0.1)
-    height = (picture.ground_row - (dark * rows).sum() / dark.sum()) * scale
-    assert height == pytest.approx(0.004, abs=0.1 * scale)
+    row, column = centre_of(dark)
+    assert column == pytest.approx(0.5 * dark.shape[1] - 0.5, abs=0.1)
+    assert (picture.ground_row - row) * scale == pytest.approx(0.004, abs=0.1 * scale)
 
 
 def test_azimuth_turns_the_camera_round_the_heap() -> None:
@@ -43,16 +46,21 @@ def test_opposite_views_are_mirror_images(heap) -> None:
     assert np.abs(one - other[:, ::-1]).mean() < 0.01
 
 
-def test_raster_and_pyvista_measure_the_same_angle(heap, angle) -> None:
-    drawn = heap_angle(heap.centers, heap.radii, azimuths=2, backend="pyvista")
-    for raster, pyvista in zip(angle.views, drawn.views, strict=True):
-        assert (pyvista.left, pyvista.right) == pytest.approx((raster.left, raster.right), abs=0.1)
+def test_raster_and_pyvista_draw_the_same_heap_and_measure_the_same_angle(heap) -> None:
+    backends = ("raster", "pyvista")
+    drawn = [silhouette(heap.centers, heap.radii, 0.7, pixels=200, backend=each) for each in backends]
+    raster, pyvista = (255.0 - picture.image for picture in drawn)
+    # Facets and subpixels differ at the edges of spheres: 3e-4 of the area (measured), hundredths of a pixel.
+    assert pyvista.sum() == pytest.approx(raster.sum(), rel=3e-3)
+    assert centre_of(pyvista) == pytest.approx(centre_of(raster), abs=0.1)
+    one, other = (measure(imaging.find_outline(p.image, p.ground_row, p.meters_per_pixel)) for p in drawn)
+    assert (other.left, other.right) == pytest.approx((one.left, one.right), abs=0.1)
 
 
 @pytest.mark.parametrize("backend", ["raster", "pyvista"])
 def test_shaded_snapshot_is_as_good_as_a_photograph(heap, angle, backend: str, tmp_path) -> None:
     views = angle.views
-    picture = snapshot(heap.centers, heap.radii, np.pi / 2, backend=backend, grains=heap.grains)
+    picture = snapshot(heap.centers, heap.radii, np.pi / 2, pixels=300, backend=backend, grains=heap.grains)
     shaded = measure_photograph(imaging.save_picture(tmp_path / "heap.jpg", picture.image))
     # Shade and compression move the edge of single grains by a fraction of a pixel.
     assert (shaded.left, shaded.right) == pytest.approx((views[1].left, views[1].right), abs=0.3)
@@ -101,8 +109,7 @@ def test_frame_is_the_same_for_every_azimuth_and_follows_the_heap(heap, angle) -
 
 def test_pyvista_draws_without_messages(tmp_path) -> None:
     script = (
-        "from imaging import silhouette, snapshot\n"
-        "snapshot([[0, 0, 1.0], [1.0, 0, 1.0]], [1.0, 1.0], backend='pyvista')\n"
+        "from imaging import silhouette\n"
         "silhouette([[0, 0, 1.0], [1.0, 0, 1.0]], [1.0, 1.0], backend='pyvista')\n"
     )
     environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}

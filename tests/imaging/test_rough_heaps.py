@@ -13,17 +13,18 @@ COVERAGE = (0.90, 0.99)
 """Required; 95 % of 60 heaps scatter by 3 % about 0.95, and the correlation length is itself an estimate."""
 
 
-@pytest.mark.parametrize(("left", "right", "grain"), [(25, 35, 6), (15, 15, 5)])
-def test_no_bias_and_true_coverage(left: float, right: float, grain: float) -> None:
-    angles = [
-        measure(draw(DrawnHeap(left, right, 200, grain=grain, seed=seed), Camera(noise=4, seed=seed)))
-        for seed in range(HEAPS)
-    ]
-    errors = np.array([(angle.left - left, angle.right - right) for angle in angles])
-    # Required: 0.2 degree. The mean of 60 flanks that scatter by 0.4 to 0.7 is known to 0.05 to 0.09.
-    np.testing.assert_allclose(errors.mean(axis=0), 0.0, atol=0.2)
-    truth = 0.5 * (left + right)
-    inside = [low <= truth <= high for low, high in (angle.interval(LEVEL) for angle in angles)]
+def test_no_bias_and_true_coverage() -> None:
+    inside = []
+    for left, right, grain in ((25.0, 35.0, 6.0), (15.0, 15.0, 5.0)):
+        angles = [
+            measure(draw(DrawnHeap(left, right, 200, grain=grain, seed=seed), Camera(noise=4, seed=seed)))
+            for seed in range(HEAPS // 2)
+        ]
+        errors = np.array([(angle.left - left, angle.right - right) for angle in angles])
+        # Required: 0.2 degree. The mean of 30 flanks that scatter by 0.4 to 0.7 is known to 0.07 to 0.13.
+        np.testing.assert_allclose(errors.mean(axis=0), 0.0, atol=0.2)
+        truth = 0.5 * (left + right)
+        inside += [low <= truth <= high for low, high in (angle.interval(LEVEL) for angle in angles)]
     assert COVERAGE[0] <= np.mean(inside) <= COVERAGE[1]
 
 
@@ -45,13 +46,13 @@ def test_small_spheres_show_their_cone() -> None:
     assert angle.mean == pytest.approx(30.0, abs=np.degrees(0.0004 / 0.05))
 
 
-def test_stray_grains_do_not_count(heap) -> None:
-    alone = heap_angle(heap.centers, heap.radii)
+def test_stray_grains_do_not_count(heap, angle) -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 7)[:-1]
     strays = np.column_stack([0.055 * np.cos(turn), 0.055 * np.sin(turn), np.full(6, 0.001)])
-    with_strays = heap_angle(np.vstack([heap.centers, strays]), np.r_[heap.radii, np.full(6, 0.001)])
+    centers, radii = np.vstack([heap.centers, strays]), np.r_[heap.radii, np.full(6, 0.001)]
+    with_strays = heap_angle(centers, radii, azimuths=2)
     # Only the scale of the picture may change, by what six spheres of 3600 do to a quantile: 0.1 degree.
-    assert compare(with_strays, alone).value == pytest.approx(0.0, abs=0.1)
+    assert compare(with_strays, angle).value == pytest.approx(0.0, abs=0.1)
 
 
 def test_interval_is_students(angle) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -19,31 +19,26 @@ from doe.numerics.kriging import Kriging
 
 @cache
 def _products(size: int, degree: int) -> np.ndarray:
-    """Return the numbers of the factors in each product of a degree, (degree, products)."""
-    return np.array([*combinations_with_replacement(range(size), degree)], dtype=int).reshape(-1, degree).T
+    """Return the numbers of 1 (0) and the factors in each product of a degree, (products, degree)."""
+    return np.array([*combinations_with_replacement(range(1 + size), degree)], dtype=int)
 
 
-def quadratic(theta: np.ndarray) -> np.ndarray:
-    """Return the terms of a full quadratic: 1, factors, squares and products, (n, terms)."""
-    i, j = _products(theta.shape[1], 2)
-    return np.concatenate([np.ones((len(theta), 1)), theta, theta[:, i] * theta[:, j]], axis=1)
-
-
-def cubic(theta: np.ndarray) -> np.ndarray:
-    """Return the terms of a full cubic: those of the quadratic, then products of three factors."""
-    i, j, k = _products(theta.shape[1], 3)
-    return np.concatenate([quadratic(theta), theta[:, i] * theta[:, j] * theta[:, k]], axis=1)
+def polynomial(theta: np.ndarray, degree: int) -> np.ndarray:
+    """Return the terms of a full polynomial: products of 1 and factors, lower degrees first, (n, terms)."""
+    one, numbers = np.ones((len(theta), 1 + theta.shape[1])), _products(theta.shape[1], degree)
+    one[:, 1:] = theta
+    return np.asarray(one.take(numbers.T, axis=1).prod(axis=1))
 
 
 def added(theta: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Return the terms of a mechanism's addition: its size times a full quadratic of size and factors."""
-    return np.asarray(size[:, None] * quadratic(np.concatenate([size[:, None], theta], axis=1)))
+    return np.asarray(size[:, None] * polynomial(np.concatenate([size[:, None], theta], axis=1), 2))
 
 
 def all_terms(x: np.ndarray, factors: int) -> np.ndarray:
     """Return the terms of the base, then of every mechanism, at coded parameters (n, parameters)."""
     theta = x[:, :factors]
-    return np.concatenate([cubic(theta), *(added(theta, size) for size in x[:, factors:].T)], axis=1)
+    return np.concatenate([polynomial(theta, 3), *(added(theta, size) for size in x[:, factors:].T)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +102,7 @@ class Addition:
             values += size[:, None] * self.polynomial.missed(np.column_stack([theta, size]))
         return np.asarray(values)
 
-    @property
+    @cached_property
     def covariance(self) -> np.ndarray:
         """Covariance of one run where an effect is allowed, mean over its runs."""
         sd = np.sqrt(self.variance) * ~self.silent
@@ -135,7 +130,7 @@ class Surfaces:
         Mechanisms add up.
         """
         theta = x[:, : x.shape[1] - len(mechanisms)]
-        values = cubic(theta) @ self.base.coefficients + self.base.missed(theta)
+        values = polynomial(theta, 3) @ self.base.coefficients + self.base.missed(theta)
         for name, size in zip(mechanisms, x[:, theta.shape[1] :].T, strict=True):
             values = values + self.additions[name].predict(theta, size)
         return np.asarray(values)
@@ -164,10 +159,11 @@ class Surfaces:
     def error(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Return the covariance of the prediction's error at one row of coded parameters."""
         theta = x[: len(x) - len(mechanisms)]
-        base, own = self._base_terms(x, mechanisms), np.diag(self.misfit_variance(x, mechanisms))
+        base, own = polynomial(theta[None], 3)[0], np.diag(self.misfit_variance(x, mechanisms))
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
             part = self.additions[name]
             terms = added(theta[None], np.array([size]))[0]
+            base = base - terms @ part.base_terms
             own += (terms @ part.gram_inverse @ terms) * part.covariance
         return np.asarray((base @ self.gram_inverse @ base) * self._base_noise(theta) + own)
 
@@ -186,7 +182,7 @@ class Surfaces:
     def _base_terms(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Return the terms by which errors of the base's coefficients enter a prediction, (terms,)."""
         theta = x[: len(x) - len(mechanisms)]
-        terms = cubic(theta[None])[0]
+        terms = polynomial(theta[None], 3)[0]
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
             terms = terms - added(theta[None], np.array([size]))[0] @ self.additions[name].base_terms
         return np.asarray(terms)

@@ -18,8 +18,7 @@ from doe.discrepancy.emulation.condition_surfaces import (
     Polynomial,
     Surfaces,
     added,
-    cubic,
-    quadratic,
+    polynomial,
 )
 from doe.discrepancy.emulation.kriged_parts import Rest
 from doe.discrepancy.emulation.run_noise import (
@@ -54,7 +53,7 @@ def repeats_of(theta: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.nd
     """
     points, groups = np.unique(theta, axis=0, return_inverse=True)
     rows, deviations = repeat_deviations(groups.reshape(-1), values)
-    if len(rows) <= values.shape[1] + 1 or len(points) <= quadratic(points).shape[1]:
+    if len(rows) <= values.shape[1] + 1 or len(points) <= polynomial(points, 2).shape[1]:
         rule = (
             "must have more points without a mechanism than polynomial terms, more repeats than observables"
         )
@@ -124,7 +123,7 @@ class BaseRuns:
     @property
     def terms(self) -> np.ndarray:
         """Terms of the base, each row times the root of its number of runs."""
-        return np.asarray(np.sqrt(self.repeats)[:, None] * cubic(self.theta))
+        return np.asarray(np.sqrt(self.repeats)[:, None] * polynomial(self.theta, 3))
 
     @property
     def response(self) -> np.ndarray:
@@ -137,7 +136,7 @@ def fit_bases(conditions: Sequence[BaseRuns]) -> list[Surfaces]:
 
     The terms of third order are shrunk as those of the mechanisms are (`fit_additions`).
     """
-    free = quadratic(conditions[0].theta).shape[1]
+    free = polynomial(conditions[0].theta, 2).shape[1]
     grams, moments = [], []
     for runs in conditions:
         linear, higher = runs.terms[:, :free], runs.terms[:, free:]
@@ -313,7 +312,7 @@ def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
         growth[column] = fit_growth(size[kept], (alone**2 / noise[kept, column])[:, None])[0]
     return Addition(
         Polynomial(fitted.coefficients, np.zeros(len(growth)), kriging),
-        fitted.inverse @ cubic(theta),
+        fitted.inverse @ polynomial(theta, 3),
         fitted.gram_inverse,
         fitted.chance,
         growth,

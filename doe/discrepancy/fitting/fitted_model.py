@@ -1,7 +1,7 @@
 """A model to be fitted: the base with some mechanisms, as emulated or as corrected by fresh runs."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -208,7 +208,8 @@ class Stack:
 
     def covariance(self, x: np.ndarray) -> np.ndarray:
         """Return the covariance of measured less predicted means at one row of coded parameters."""
-        own = self.noise(x) + _blocks(self.model.error(x, block) for block in self.blocks)
+        parts = zip(self._noises(x), self.blocks, strict=True)
+        own = _blocks(noise + self.model.error(x, block) for noise, block in parts)
         return own + self.common.T @ self.common
 
     def open_error(self, x: np.ndarray) -> np.ndarray:
@@ -251,11 +252,15 @@ class Stack:
 
     def noise(self, x: np.ndarray) -> np.ndarray:
         """Return the covariance of the measured means alone, (means, means)."""
+        return _blocks(self._noises(x))
+
+    def _noises(self, x: np.ndarray) -> Iterator[np.ndarray]:
+        """Return the covariances of the measured means of each block alone."""
         model = self.model
         runs = {block.condition: model.run_covariance(x, block.condition) for block in self.blocks}
         # all blocks are means of the same replicates, or of as few
         excess = model.excess(x, self.blocks[0].scatter, runs)
-        return _blocks(model.noise_of(runs[block.condition], block, excess) for block in self.blocks)
+        return (model.noise_of(runs[block.condition], block, excess) for block in self.blocks)
 
 
 def _blocks(parts: Iterable[np.ndarray]) -> np.ndarray:

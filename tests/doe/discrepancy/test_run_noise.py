@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from doe.discrepancy.emulation import run_noise
-from doe.discrepancy.emulation.condition_surfaces import cubic
+from doe.discrepancy.emulation.condition_surfaces import polynomial
 from doe.discrepancy.emulation.run_noise import ALIKE, fit_noise, fit_noises, shared_correlations
 from doe.discrepancy.emulation.surface_fits import BaseRuns, fit_bases, shared_misfits
 
@@ -123,7 +123,7 @@ def _squares(rng: np.random.Generator, worlds: Sequence[World], count: int) -> n
     repeats, means = [], []
     for planes, surface in worlds:
         sd = np.exp(0.5 * (planes[0] + theta @ planes[1:]))
-        runs = cubic(theta) @ surface + sd * rng.standard_normal((2, 24, 6))
+        runs = polynomial(theta, 3) @ surface + sd * rng.standard_normal((2, 24, 6))
         repeats.append((theta, (runs[0] - runs[1]) / np.sqrt(2.0)))
         means.append(runs.mean(axis=0))
     noises, twice = fit_noises(repeats, FLOOR), np.full(24, 2)
@@ -132,7 +132,7 @@ def _squares(rng: np.random.Generator, worlds: Sequence[World], count: int) -> n
     for emulated, (planes, surface) in zip(fit_bases(runs_of), worlds, strict=True):
         for number, at in enumerate(points):
             variance = np.exp(planes[0] + at @ planes[1:]) / 8.0
-            measured = cubic(at[None])[0] @ surface + np.sqrt(variance) * rng.standard_normal(6)
+            measured = polynomial(at[None], 3)[0] @ surface + np.sqrt(variance) * rng.standard_normal(6)
             error = measured - emulated.predict(at[None], ())[0]
             scatter = emulated.noise.covariance(at) / 8.0 * emulated.noise.inverse_bias(6)
             q[number] += error @ np.linalg.solve(scatter + emulated.error(at, ()), error)

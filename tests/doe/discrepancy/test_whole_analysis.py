@@ -169,7 +169,7 @@ def test_a_pair_that_cannot_be_simulated_is_not_named() -> None:
 
 
 def test_what_the_library_lacks_is_unknown() -> None:
-    found, _ = _run(measure({"outsider": 1.0}, 6), FEW)
+    found, waves = _run(measure({"outsider": 2.0}, 6), FEW)
     assert found.verdict == Verdict.UNKNOWN
     assert found.named == ()
     assert found.before_after == ()
@@ -181,10 +181,6 @@ def test_what_the_library_lacks_is_unknown() -> None:
     assert found.reason.startswith(" with ".join(found.closest.mechanisms))
     # both of any two models are refused: nothing is to be distinguished
     assert found.next_experiment is None
-
-
-def test_what_cannot_fit_costs_one_look() -> None:
-    _, waves = _run(measure({"outsider": 2.0}, 6), FEW)
     one_model = SETTINGS.refinement_points * SETTINGS.refinement_repeats * len(CONDITIONS)
     # No mechanism of the library, and not the base, comes near: the best is run to be sure, no other is.
     assert len(waves[0]) == one_model
@@ -195,7 +191,7 @@ def test_what_cannot_fit_costs_one_look() -> None:
 def test_a_forecast_that_fails_is_a_gap_though_the_fit_is_good() -> None:
     whole = measure({}, 3)
     values = dict(whole.values)
-    values["fast-wide"] = values["fast-wide"] + 3.0 * values["fast-wide"].std(axis=0)
+    values["fast-wide"] = values["fast-wide"] + 1.5 * values["fast-wide"].std(axis=0)
     found, _ = _run(Measured(CONDITIONS, OBSERVABLES, values), FEW)
     assert found.verdict == Verdict.UNKNOWN
     assert found.gap is not None
