@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from doe.arguments import checked_choice, checked_count, checked_list
 from doe.design.factors import Factor
@@ -95,10 +96,17 @@ def contains(term: Term, part: Term) -> bool:
 
 def model_matrix(coded: pd.DataFrame, terms: Iterable[Term]) -> pd.DataFrame:
     """Return a column of ones and one a term (named so) at coded points; same index."""
-    columns = {"intercept": np.ones(len(coded))}
-    for term in terms:
-        columns[term_name(term)] = coded[list(term)].to_numpy().prod(axis=1)
-    return pd.DataFrame(columns, index=coded.index)
+    terms = tuple(terms)
+    values = model_values(coded.to_numpy(dtype=np.float64), list(coded.columns), terms)
+    return pd.DataFrame(values, coded.index, ["intercept", *map(term_name, terms)])
+
+
+def model_values(
+    points: NDArray[np.float64], names: Sequence[str], terms: Iterable[Term]
+) -> NDArray[np.float64]:
+    """Return the same numbers at points of shape (points, factors): (points, terms + 1), by columns."""
+    columns = [points[:, [names.index(name) for name in term]].prod(axis=1) for term in terms]
+    return np.array([np.ones(len(points)), *columns]).T
 
 
 def natural_coefficients(coded: Mapping[Term, float], factors: Iterable[Factor]) -> dict[Term, float]:

@@ -23,6 +23,7 @@ from doe.design.polynomial_terms import (
     find_term,
     model_matrix,
     model_terms,
+    model_values,
     natural_coefficients,
     parsed_terms,
     term_name,
@@ -251,16 +252,22 @@ class Surface:
         After ``reduce`` the standard error is that of the model before (see ``unselected``).
         """
         points = arguments.checked_points(coded, len(self.design.names))
-        table = pd.DataFrame(points, columns=self.design.names)
-        return self._mean(table), self.unselected._standard_error(table)
+        return self._mean(points), self.unselected._standard_error(points)
 
-    def _mean(self, coded: pd.DataFrame) -> NDArray[np.float64]:
-        return model_matrix(coded, self.terms).to_numpy() @ self.coded_coefficients.to_numpy()
+    def _mean(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return model_values(points, self.design.names, self.terms) @ self._coefficients
 
-    def _standard_error(self, coded: pd.DataFrame) -> NDArray[np.float64]:
-        matrix = model_matrix(coded, self.terms).to_numpy()
-        count = matrix.shape[1]
-        covariance = self.fit.cov_params().to_numpy()[:count, :count]
+    @cached_property
+    def _coefficients(self) -> NDArray[np.float64]:
+        return self.coded_coefficients.to_numpy()
+
+    @cached_property
+    def _covariance(self) -> NDArray[np.float64]:
+        count = len(self.terms) + 1
+        return self.fit.cov_params().to_numpy()[:count, :count]
+
+    def _standard_error(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        matrix, covariance = model_values(points, self.design.names, self.terms), self._covariance
         return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", matrix, covariance, matrix), 0.0))
 
     def predict(
@@ -293,7 +300,7 @@ class Surface:
             if isinstance(points, pd.DataFrame)
             else pd.DataFrame([arguments.checked_map("points", points)])
         )
-        inside = self._coded_table(table, arguments.checked_flag("coded", coded))
+        inside = self._coded_table(table, arguments.checked_flag("coded", coded)).to_numpy()
         honest = self.unselected
         center, se = honest.evaluate(inside)
         t = stats.t.isf(0.5 * level, honest.residual_df)

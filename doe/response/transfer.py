@@ -21,7 +21,7 @@ from statsmodels.regression.linear_model import GLS
 
 from doe import arguments
 from doe.design.design import Design, coded_points, coded_setting, natural_points
-from doe.design.polynomial_terms import INTERCEPT, model_matrix
+from doe.design.polynomial_terms import INTERCEPT, model_values
 from doe.errors import DesignError
 from doe.response import region, surface_points
 from doe.response.quadratic import QuadraticForm
@@ -127,14 +127,13 @@ class Transfer:
 
     def _columns(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the columns of shift and scale relative to the level, (points, 2)."""
-        table = pd.DataFrame(points, columns=self.design.names)
-        values = model_matrix(table, self.source.terms).to_numpy() @ self.source.coded_coefficients.to_numpy()
+        columns = model_values(points, self.design.names, self.source.terms)
+        values = columns @ self.source.coded_coefficients.to_numpy()
         return np.column_stack([np.ones(len(points)), values - self.level])
 
     def _rows(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the terms of the model whose errors are the surface's, (points, terms)."""
-        table = pd.DataFrame(points, columns=self.design.names)
-        return model_matrix(table, self.source.unselected.terms).to_numpy()
+        return model_values(points, self.design.names, self.source.unselected.terms)
 
     @cached_property
     def _surface_covariance(self) -> NDArray[np.float64]:

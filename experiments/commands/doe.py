@@ -32,7 +32,6 @@ OPTIMUM_EXAMPLE = "Example: [bold]dem-warp doe optimum runs.csv --wish angle=28.
 CLIMB_EXAMPLE = "Example: [bold]dem-warp doe climb climb.csv --target 28.6[/]"
 COMPARE_EXAMPLE = "Example: [bold]dem-warp doe compare runs.csv --value simulated --reference measured[/]"
 
-MODELS = ("first-order", "interaction", "quadratic", "three-factor")
 WISH = re.compile(r"(?P<aim>[^:]+)(?::\s*(?P<low>[^.\s]+(?:\.\d+)?)\s*\.\.\s*(?P<high>\S+))?")
 
 Table = Annotated[Path, typer.Argument(metavar="TABLE.csv", help="Runs: factors, and at least one response.")]
@@ -280,6 +279,8 @@ def _number_or_word(text: str | None) -> float | str | None:
 
 def _terms(model: str) -> str | list[str]:
     """Return the name of a model, or its terms."""
+    from doe.design.polynomial_terms import MODELS
+
     return model if model in MODELS else [term.strip() for term in model.split(",")]
 
 

@@ -38,20 +38,21 @@ def new_figure(x: str = "", y: str = "", legend: bool = True) -> go.Figure:
     axis = lines | {"ticks": "outside", "tickcolor": MUTED, "automargin": True}
     above = {"orientation": "h", "x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}
     family = "system-ui, Segoe UI, Roboto, Helvetica, Arial, sans-serif"
-    figure = go.Figure()
-    figure.update_layout(
-        template="none",
-        font={"family": family, "size": 13, "color": INK},
-        paper_bgcolor="rgba(0,0,0,0)",  # that of the page, light or dark
-        plot_bgcolor="rgba(0,0,0,0)",
-        margin={"l": 56, "r": 18, "t": 36 if legend else 14, "b": 48},
-        showlegend=legend,
-        legend=above | {"itemsizing": "constant"},
-        dragmode=False,  # a finger that scrolls the page must not zoom the chart
-        xaxis=axis | {"title": {"text": x, "standoff": 8}},
-        yaxis=axis | {"title": {"text": y, "standoff": 8}},
+    return go.Figure(
+        # at once: update_layout takes fifteen times as long
+        layout={
+            "template": "none",
+            "font": {"family": family, "size": 13, "color": INK},
+            "paper_bgcolor": "rgba(0,0,0,0)",  # that of the page, light or dark
+            "plot_bgcolor": "rgba(0,0,0,0)",
+            "margin": {"l": 56, "r": 18, "t": 36 if legend else 14, "b": 48},
+            "showlegend": legend,
+            "legend": above | {"itemsizing": "constant"},
+            "dragmode": False,  # a finger that scrolls the page must not zoom the chart
+            "xaxis": axis | {"title": {"text": x, "standoff": 8}},
+            "yaxis": axis | {"title": {"text": y, "standoff": 8}},
+        }
     )
-    return figure
 
 
 def add_points(
