@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 import json
 import math
-import textwrap
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -68,13 +69,18 @@ def meanings(kind: type) -> dict[str, str]:
     for each in reversed(inspect.getmro(kind)[:-1]):
         if each.__module__.startswith("pydantic."):
             continue
-        [definition] = ast.parse(textwrap.dedent(inspect.getsource(each))).body
-        body = getattr(definition, "body", [])
-        for pair in pairwise(body):
+        for pair in pairwise(_bodies(each.__module__)[each.__name__]):
             match pair:
                 case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
                     found[name] = " ".join(words.split())
     return found
+
+
+@functools.cache
+def _bodies(module: str) -> dict[str, list[ast.stmt]]:
+    """Statements of the classes of a module, by name."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {node.name: node.body for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
 
 
 def _rows(section: type[BaseModel], path: str, array: bool = False) -> Iterator[Row]:

@@ -2,14 +2,18 @@
 
 from pathlib import Path
 
-from typer.testing import CliRunner
+from click.testing import CliRunner
+from typer.main import get_command
 
 from experiments.cli import app
+
+COMMAND = get_command(app)
+"""The command line; typer would build it anew for each call."""
 
 
 def dem_warp(*arguments: object) -> tuple[int, str, str]:
     """Run a command; return its exit code, what it says on standard output, and on standard error."""
-    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    result = CliRunner().invoke(COMMAND, [str(argument) for argument in arguments])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result.exit_code, result.stdout, result.stderr
 

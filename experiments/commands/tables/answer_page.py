@@ -46,7 +46,9 @@ def publish(answer: Answer, out: Path, source: str) -> None:
         safe.columns = [safe_cell(head) for head in safe.columns]
         write_text(out / "tables" / f"{name}.csv", safe.to_csv(index=False, lineterminator="\n"))
     pictures = []
-    for name, (caption, figure) in answer.plots.items():
+    for name, (caption, draw) in answer.plots.items():
+        if (figure := answer.made(caption, draw)) is None:
+            continue
         buffer = io.BytesIO()
         figure.savefig(buffer, format="png", dpi=DOTS)
         (out / "plots" / f"{name}.png").write_bytes(buffer.getvalue())

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -30,6 +30,8 @@ from experiments.commands.tables.sheet import Sheet, read_mixture
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Made = TypeVar("Made")
+
 MOST_TRACES = 3
 """Pairs of factors whose interaction is drawn, the largest effects first."""
 RIDGE_RADII = np.linspace(0.0, 1.0, 6)
@@ -44,19 +46,26 @@ class Answer:
     texts: list[str] = field(default_factory=list)
     tables: dict[str, tuple[str, pd.DataFrame]] = field(default_factory=dict)
     """Captions and tables, by name."""
-    plots: dict[str, tuple[str, Figure]] = field(default_factory=dict)
-    """Captions and figures, by name."""
+    plots: dict[str, tuple[str, Callable[[], Figure]]] = field(default_factory=dict)
+    """Captions and what draws the figures, by name."""
     notes: list[str] = field(default_factory=list)
 
-    def add(self, name: str, caption: str, make: Callable[[], Any]) -> None:
-        """Add a table or plot, or a note if the statistics have none for this design."""
+    def add(self, name: str, caption: str, make: Callable[[], pd.DataFrame]) -> None:
+        """Add a table, or a note if the statistics have none for this design."""
+        if (made := self.made(caption, make)) is not None:
+            self.tables[name] = caption, made
+
+    def draw(self, name: str, caption: str, make: Callable[[], Figure]) -> None:
+        """Add a plot, which is drawn when the answer is published."""
+        self.plots[name] = caption, make
+
+    def made(self, caption: str, make: Callable[[], Made]) -> Made | None:
+        """Make a part of the answer; None, and a note, if the statistics have none for this design."""
         try:
-            made = make()
+            return make()
         except DesignError as error:
             self.notes.append(f"No {caption[0].lower()}{caption[1:].rstrip('.')}: {error}.")
-            return
-        place = self.tables if isinstance(made, pd.DataFrame) else self.plots
-        place[name] = caption, made  # type: ignore[assignment]
+            return None
 
 
 def run_table(design: Design | Mixture) -> pd.DataFrame:
@@ -118,8 +127,8 @@ def screen_table(sheet: Sheet, name: str, error: str | None, alpha: float) -> An
             lambda: doe.two_level_effects(design, values).table,
         )  # fmt: skip
     answer.add("climb", "Steepest climb from the center.", lambda: _climb(result))
-    answer.plots["pareto"] = "Effects and the limits of the test.", plots.pareto_chart(result)
-    answer.plots["half_normal"] = "Half-normal plot.", plots.half_normal_plot(result, name)
+    answer.draw("pareto", "Effects and the limits of the test.", lambda: plots.pareto_chart(result))
+    answer.draw("half_normal", "Half-normal plot.", lambda: plots.half_normal_plot(result, name))
     _add_means(answer, design, values, name, list(result.table.sort_values("rank").index))
     found = ", ".join(result.significant(alpha)) or "none"
     answer.notes.insert(0, f"Significant at {alpha:g}: {found}.")
@@ -135,10 +144,10 @@ def _add_means(
     answer: Answer, design: Design, values: pd.Series, name: str, ranked: Sequence[str]
 ) -> None:  # fmt: skip
     """Add the plots of means by level, of single factors and of the largest ones in pairs."""
-    answer.add("main_effects", "Means by level.", lambda: plots.main_effects_plot(design, values, name))
+    answer.draw("main_effects", "Means by level.", lambda: plots.main_effects_plot(design, values, name))
     pairs = [(x, trace) for i, x in enumerate(ranked) for trace in ranked[i + 1 :]][:MOST_TRACES]
     for x, trace in pairs:
-        answer.add(
+        answer.draw(
             f"interaction_{x}_{trace}", f"Means by {x} and {trace}.",
             partial(plots.interaction_plot, design, values, x, trace, name),
         )  # fmt: skip
@@ -154,7 +163,7 @@ def climb_runs(sheet: Sheet, name: str, target: float) -> Answer:
     answer.texts.append(table.to_string())
     none = pd.Series(np.nan, index=design.coded.index)
     path = ClimbPath(design.factors, design.points, predicted=none)
-    answer.add(
+    answer.draw(
         "climb", "Runs and target.", lambda: plots.climb_plot(path, values, target, response_label=name)
     )
     return answer
@@ -175,7 +184,7 @@ def compare_columns(sheet: Sheet, value: str, reference: str) -> Answer:
     answer = Answer(f"{value} against {reference}", [table.to_string()])
     answer.tables["agreement"] = f"Agreement of {value} with {reference}, with 95 % intervals.", table
     groups = ["runs"] * len(both)
-    answer.add("agreement", "Run by run.", lambda: plots.agreement_plot(result, groups, value, reference))
+    answer.draw("agreement", "Run by run.", lambda: plots.agreement_plot(result, groups, value, reference))
     return answer
 
 
@@ -195,7 +204,7 @@ def fit_table(sheet: Sheet, name: str, model: Any, alpha: float, reduced: bool) 
     _add_canonical(answer, surface, alpha)
     answer.add("influence", "Influence of each observation.", lambda: doe.influence(surface))
     _add_checks(answer, surface)
-    answer.plots["residuals"] = "Residuals.", plots.residual_plots(surface)
+    answer.draw("residuals", "Residuals.", lambda: plots.residual_plots(surface))
     _add_surface_plots(answer, surface, name)
     return answer, surface
 
@@ -249,15 +258,17 @@ def _add_surface_plots(answer: Answer, surface: Surface, name: str) -> None:
     names = surface.design.names
     center = {factor.name: factor.center for factor in surface.design.factors}
     if len(names) > 1:
-        answer.add("contour", "Contours.", lambda: plots.contour_plot(surface, response_label=name))
-        answer.add("surface", "Surface.", lambda: plots.surface_plot(surface, response_label=name))
+        answer.draw("contour", "Contours.", lambda: plots.contour_plot(surface, response_label=name))
+        answer.draw("surface", "Surface.", lambda: plots.surface_plot(surface, response_label=name))
     if len(names) == 3:
-        answer.add(
+        answer.draw(
             "cube", "Fitted responses at the corners.", lambda: plots.cube_plot(surface, response_label=name)
         )
-    answer.add("profile", "Profiles through the center.", lambda: plots.profile_plot({name: surface}, center))
+    answer.draw(
+        "profile", "Profiles through the center.", lambda: plots.profile_plot({name: surface}, center)
+    )
     if len(names) == 2:
-        answer.add(
+        answer.draw(
             "stationary_region", "Settings that may be the stationary point.",
             lambda: plots.contour_plot(surface, region=doe.stationary_region(surface), response_label=name),
         )  # fmt: skip
@@ -313,10 +324,10 @@ def best_setting(
         if near := answer.tables.get("nearest"):
             answer.texts.append(f"{near[0]}\n{near[1].to_string()}")
     point = dict(best.natural)
-    answer.add("profile", "Profiles through it.", lambda: plots.profile_plot(surfaces, point, scales))
+    answer.draw("profile", "Profiles through it.", lambda: plots.profile_plot(surfaces, point, scales))
     if scales and len(best.natural) > 1:
         limits = {name: (wish.low, wish.high) for name, wish in scales.items()}
-        answer.add(
+        answer.draw(
             "overlay", "Settings that keep all limits.",
             lambda: plots.overlay_plot(surfaces, limits, at=point, point=point, extent=extent),
         )  # fmt: skip
