@@ -11,8 +11,8 @@ from doe import Design, DesignError, Factor, ScreenResult, plackett_burman, scre
 from experiments.calibrate.cases import failure_summary, measured, plan_cases, response_table, too_many_failed
 from experiments.calibrate.results import Decision, Screened, ScreeningResult
 from experiments.calibrate.values import key_of, p_text, quantity
-from experiments.io.errors import InputError
-from experiments.io.plug_ins import made_in
+from experiments.io.errors import InputError, shortened
+from experiments.io.plug_ins import calling, made_in
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response, ScreeningSettings
 
@@ -21,7 +21,7 @@ STAGE = "screening"
 
 def _check(name: str, design: object, known: object) -> None:
     if not callable(design):
-        raise TypeError(f"must be a function of factors and a number of runs, got {design!r}")
+        raise TypeError(f"must be a function of factors and a number of runs, got {shortened(repr(design))}")
 
 
 DESIGNS: Registry[Callable[[Sequence[Factor], int], Design]] = Registry(
@@ -38,10 +38,11 @@ def screening_design(factors: Sequence[Factor], settings: ScreeningSettings) -> 
     if settings.design not in DESIGNS:
         raise ValueError(f"design must be one of {', '.join(DESIGNS)}, got {settings.design!r}")
     fewest = max(LEAST_RUNS, 4 * -(-(len(factors) + settings.dummies + 1) // 4))
-    design = DESIGNS[settings.design](factors, settings.runs or fewest)
-    if not isinstance(design, Design):
-        made = made_in(DESIGNS[settings.design])
-        raise InputError("campaign.screening.design", f"{made} must return a doe.Design", design)
+    make, place = DESIGNS[settings.design], "campaign.screening.design"
+    with calling(make, place):
+        design = make(factors, settings.runs or fewest)
+    if not isinstance(design, Design) or design.factors != tuple(factors):
+        raise InputError(place, f"{made_in(make)} must return a doe.Design of the study's factors", design)
     return design
 
 

@@ -149,10 +149,14 @@ def clear_errors(advice: object = "") -> Iterator[None]:
             if error.errno and error.strerror != os.strerror(error.errno):
                 way_out = ""  # its raiser says what to do
             fail(f"{place}{error.strerror or error}{way_out}. {advice}", FAILED_RUN)
-        except ValueError as error:
-            if not _is_input(error):
+        except Exception as error:
+            if isinstance(error, ValueError) and _is_input(error):
+                fail(str(error))
+            from experiments.io.plug_ins import described, fault_of
+
+            if not fault_of(error):
                 raise
-            fail(str(error))
+            fail(f"a plug-in raised {described(error)}. {advice}", FAILED_RUN)
 
 
 @contextmanager

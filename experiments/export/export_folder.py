@@ -12,6 +12,7 @@ from experiments.export.exporters import EXPORTERS
 from experiments.export.laws import Translated
 from experiments.io.errors import InputError, Problem
 from experiments.io.files import write_text
+from experiments.io.plug_ins import calling, made_in
 from experiments.io.program_version import program_version
 from experiments.io.texts import safe_text
 
@@ -43,7 +44,11 @@ def export_input(
     known = {name: each.translate for name, each in EXPORTERS.items() if each.translate is not None}
     if to not in known:
         raise InputError("--to", f"must be one of {', '.join(known)}", to)
-    translation = known[to](test)
+    translate, place = known[to], f"exporter {to}"
+    with calling(translate, place):
+        translation = translate(test)
+    if not isinstance(translation, Translation):
+        raise InputError(place, f"{made_in(translate)} must return a Translation", translation)
     if translation.warnings and not approximate:
         hint = f"{option} substitutes the nearest that it has"
         problem = f"{EXPORTERS[to].code} does not support the whole test"

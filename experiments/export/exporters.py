@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +17,8 @@ from experiments.export.liggghts_exporter import LIGGGHTS
 from experiments.export.mercury_exporter import MERCURY
 from experiments.export.sheet import EDEM, ROCKY
 from experiments.export.yade_exporter import YADE
+from experiments.io.errors import InputError
+from experiments.io.plug_ins import calling, made_in
 
 
 def _check(name: str, exporter: object, known: object) -> None:
@@ -46,13 +49,22 @@ def case_terms(name: str, case: Case[Any]) -> list[tuple[str, Term]]:
     radius = max(float(shape.radii.max()) for shape in shapes) * size
     mass = case.grain_material.density * case.grains.mean(lambda shape: shape.volume) * size**3
     among, wall = contacts_of(base, radius, mass)
-    rows = [
-        *(("grain", term) for term in exporter.material_terms(among.first)),
-        *(("wall", term) for term in exporter.material_terms(wall.second)),
-    ]
-    for subject, contact in (("grain with grain", among), ("grain with wall", wall)):
-        rows += [(subject, term) for term in exporter.contact_terms(contact)]
-    return rows
+    parts = (
+        ("grain", exporter.material_terms, among.first),
+        ("wall", exporter.material_terms, wall.second),
+        ("grain with grain", exporter.contact_terms, among),
+        ("grain with wall", exporter.contact_terms, wall),
+    )
+    return [(subject, term) for subject, terms, of in parts for term in _terms(name, terms, of)]
+
+
+def _terms(name: str, terms: Callable[[Any], tuple[Term, ...]], of: object) -> tuple[Term, ...]:
+    """Call a function of an exporter; InputError if it raises, or does not return terms."""
+    with calling(terms, place := f"exporter {name}"):
+        found = terms(of)
+    if not (isinstance(found, tuple) and all(isinstance(term, Term) for term in found)):
+        raise InputError(place, f"{made_in(terms)} must return a tuple of Term", found)
+    return found
 
 
 def term_warnings(name: str, case: Case[Any]) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ from experiments.measurement.instrument_error import CALIBRATION, stated_calibra
 from experiments.measurement.readings import CLOGGED, CLOGGED_ROW, Outlines, Reading, readings_of
 from experiments.measurement.value_limits import ValueLimits, inversions, limits_of_test
 from experiments.studyfile import Condition, Study
-from experiments.studyfile.observables import Observable
+from experiments.studyfile.observables import BULK, BULK_DENSITY, SOLID_FRACTION, Observable, filling
 from imaging import PictureError
 
 COLUMNS = ("condition", "replicate", "observable", "value", "unit", "picture", "pixel", "fit", "profile")
@@ -41,11 +41,21 @@ NEEDED = COLUMNS[:3]
 """Columns that the file must have."""
 
 
-def read_measured(path: Path, study: Study) -> Measured:
-    """Read heaps measured under the conditions of a study, with its measurement settings."""
+def read_measured(path: Path, study: Study, filled: bool = False) -> Measured:
+    """Read heaps measured under the conditions of a study, with its measurement settings.
+
+    With ``filled`` the observables of the filling are read too, for a target. Without, a bulk density is the
+    solid fraction that it gives with the density of the grain, where that is an observable.
+    """
     sizes = {condition.name: limits_of_test(study.under(condition.name)) for condition in study.conditions}
     observables = study.measurable
-    found = _Found({name: each for each in observables for name in (each.name, each.column)})
+    if filled:
+        observables = tuple(
+            {each.name: each for each in (*observables, *filling(study.scene.observables))}.values()
+        )
+    found = _Found({name: each for each in observables for name in (each.name, each.column)}, filled)
+    if not filled and SOLID_FRACTION in found.known:
+        found.known[BULK_DENSITY] = BULK
     stated = []
     for row in read_rows(path, NEEDED, COLUMNS):
         if row["condition"] == CALIBRATION and CALIBRATION not in sizes:
@@ -68,8 +78,10 @@ def read_measured(path: Path, study: Study) -> Measured:
 class _Found:
     """Contents of a file: heaps by condition and replicate, and problems with their rows."""
 
-    known: Mapping[str, Observable]
+    known: dict[str, Observable]
     """Observables of the test, by name and by alias."""
+    filled: bool = False
+    """A bulk density remains one."""
     heaps: dict[tuple[str, str], list[Reading]] = field(default_factory=dict)
     doubts: list[tuple[int, Problem]] = field(default_factory=list)
     """Values that the test cannot give, which are ignored."""
@@ -87,6 +99,8 @@ class _Found:
             heap = self.heaps.setdefault(_heap_of(row, sizes), [])
             readings = list(readings_of(row, sizes[row["condition"]], fit, self.known, self.outlines))
             self._require_own(row, readings)
+            if not self.filled:
+                readings = [_as_solid_fraction(reading, sizes[row["condition"]]) for reading in readings]
         except InputError as error:
             self.problems += [(row.line, problem) for problem in error.problems]
         except PictureError as error:
@@ -110,6 +124,13 @@ class _Found:
         if self.problems or (self.doubts and not any(self.heaps.values())):
             wrong = sorted([*self.problems, *self.doubts], key=itemgetter(0))
             raise InputError.of(_grouped(wrong))
+
+
+def _as_solid_fraction(reading: Reading, size: ValueLimits) -> Reading:
+    """Turn a bulk density into the part of the volume that grains fill."""
+    if reading.observable != BULK_DENSITY:
+        return reading
+    return replace(reading, observable=SOLID_FRACTION, value=reading.value / size.density)
 
 
 def _grouped(wrong: Sequence[tuple[int, Problem]]) -> Iterator[Problem]:

@@ -17,7 +17,7 @@ from experiments.measurement.profile_responses import counted_twice, with_profil
 from experiments.measurement.readings import require_same_fit
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
-from experiments.studyfile.observables import ANGLE, BY_NAME
+from experiments.studyfile.observables import ANGLE, BY_NAME, filling
 from experiments.studyfile.target_section import ResponseSection, TargetSection
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
         return _with_pictures(study, f"{place}.pictures")
     if section.file is not None:
         path = study.file.parent / section.file
-        measured = read_measured(path, study)
+        measured = read_measured(path, study, filled=True)
         found, notes = [], list(measured.notes)
         for condition in measured.conditions:
             for name, column in zip(measured.observables, measured.values[condition].T, strict=True):
@@ -169,7 +169,8 @@ def _given(study: Study, measured: list[Replicated], note: str, asked: Replicate
 
 def _values(study: Study, one: Replicated) -> dict[str, Any]:
     """Return the values of a measurement's section."""
-    units = {name: each.unit for each in study.measurable for name in (each.name, each.column)}
+    known = (*study.measurable, *filling(study.scene.observables))
+    units = {name: each.unit for each in known for name in (each.name, each.column)}
     unit, column = units[one.observable], _column(one)
     unit = "" if unit == "1" else unit
     numbers: dict[str, Any] = {

@@ -18,6 +18,9 @@ from experiments.studyfile.observables import BY_NAME, OBSERVABLES, Observable
 PATIENCE = 10.0
 """Longest time for a heap to come to rest after the lift [s]."""
 
+LOOSEST = 0.01
+"""Smallest part of a container that grains fill: straw fills some 0.05."""
+
 
 @dataclass(frozen=True)
 class ValueLimits:
@@ -29,12 +32,15 @@ class ValueLimits:
     """Radius of the flattest heap of the grains in the tube, or the extent of another test [m]."""
     time: float
     """Time from the start of the lift until long after its end [s]; infinite for another test."""
+    density: float
+    """Density of the grain [kg/m3]."""
     radius: float | None = None
     """Radius of a drum [m]."""
 
     def limits(self, observable: Observable) -> tuple[float, float]:
-        """Return the smallest and largest possible value of an observable, in its unit (deg, m, s or 1)."""
+        """Return the smallest and largest possible value of an observable, in its unit."""
         by_unit = {"deg": (0.0, 90.0), "m": (self.grain, self.length), "s": (0.0, self.time)}
+        by_unit["kg/m^3"] = (LOOSEST * self.density, self.density)
         if observable.part_of:  # the height beyond a heap's foot is 0; a drum's axis is in its middle
             return (0.0 if self.radius is None else -self.length), self.length
         masses = {"kg": (0.0, math.inf), "kg/s": (0.0, math.inf)}
@@ -51,14 +57,14 @@ class ValueLimits:
 def limits_of_test(study: Study, scene: str = TARGET_SCENE) -> ValueLimits:
     """Return the limits of a study's test, or of another of its scenes."""
     case = study.case({}, 0, scene)
-    test = case.scene
+    test, density = case.scene, case.grain_material.density
     if not isinstance(test, LiftedCylinder):
         half_x, half_y, bottom = test.room(case.grains.grain_reach)
         room = max(2.0 * half_x, 2.0 * half_y, test.brim - bottom)
         radius = test.diameter / 2 if isinstance(test, Drum) else None
-        return ValueLimits(case.grains.smallest_sphere, room, math.inf, radius)
-    reach = 4.0 * test.diameter + 2.0 * test.height
-    return ValueLimits(case.grains.smallest_sphere, reach, PATIENCE + 10.0 * test.height / test.lift_speed)
+        return ValueLimits(case.grains.smallest_sphere, room, math.inf, density, radius)
+    reach, time = 4.0 * test.diameter + 2.0 * test.height, PATIENCE + 10.0 * test.height / test.lift_speed
+    return ValueLimits(case.grains.smallest_sphere, reach, time, density)
 
 
 def inversions(heap: Mapping[str, float]) -> Iterable[tuple[str, str]]:

@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import pandas as pd
 
 from dem_warp import Case
 from experiments.export import EXPORTERS, case_terms, term_warnings
+from experiments.io.errors import InputError
 from experiments.report.kit.html import Chapter
 from experiments.report.kit.table import Layout, Table, columns, make_table
 from experiments.report.sections import chapter
+
+_log = logging.getLogger(__name__)
 
 NAME = "other_codes"
 
 
 def other_codes_chapter(case: Case[Any]) -> Chapter:
-    """Build the chapter of a case's values, a table for every code that they can go to."""
-    return chapter(NAME, {EXPORTERS[name].code: _terms_table(name, case) for name in EXPORTERS})
+    """Build the chapter of a case's values, a table for every code that they can go to.
+
+    An exporter that fails is left out, with a warning.
+    """
+    tables = {}
+    for name, exporter in EXPORTERS.items():
+        try:
+            tables[exporter.code] = _terms_table(name, case)
+        except InputError as error:
+            _log.warning("%s; it is not in the report", error)
+    return chapter(NAME, tables)
 
 
 def _terms_table(name: str, case: Case[Any]) -> Table:

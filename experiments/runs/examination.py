@@ -33,7 +33,7 @@ from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.resources import PROCESS_BYTES
 from experiments.cases.workers.submissions import submit_command
 from experiments.io.own_packages import OWN
-from experiments.io.plug_ins import plug_ins
+from experiments.io.plug_ins import described, plug_ins
 from experiments.io.program_version import ROOT, program_version
 from experiments.runs.choices import BENCH, PAPER
 from experiments.studyfile import load_study
@@ -190,7 +190,7 @@ def _tried(name: str, check: Callable[[], list[Finding]], needed: bool = False) 
     try:
         return check()
     except Exception as error:
-        return [Finding(name, False, f"{type(error).__name__}: {error}".splitlines()[0], needed)]
+        return [Finding(name, False, described(error).splitlines()[0], needed)]
 
 
 def _simulation() -> list[Finding]:
@@ -198,7 +198,7 @@ def _simulation() -> list[Finding]:
     try:
         [result] = simulate([_thirty_balls()], workers=1)
     except Exception as error:
-        text = f"{type(error).__name__}: {error}".splitlines()[0]
+        text = described(error).splitlines()[0]
         return [Finding("simulation", False, text, needed=True, cure=cure)]
     text = f"a heap of 30 spheres on {result.provenance['device']} "
     good = result.status == "finished"

@@ -243,7 +243,7 @@ PROFILES = {SURFACE_PROFILE: SURFACE, OUTLINE_PROFILE: tuple(each.name for each 
 
 SOLID_FRACTION, BULK_DENSITY = "solid_fraction", "bulk_density"
 """Observable of a filling, and the one that follows from it and the density of the grain."""
-_BULK_DENSITY = Observable(
+BULK = Observable(
     BULK_DENSITY,
     "bulk density",
     "kg/m^3",
@@ -271,16 +271,17 @@ VERSION = 2
 def observables_of(declared: Mapping[str, Declared], leaves_a_heap: bool) -> dict[str, Observable]:
     """Collect what a scene declares and what pictures of its heap show, by columns in a table of cases."""
     heap = {each.column: each for each in (*OBSERVABLES, *OUTLINE)} if leaves_a_heap else {}
-    filling = {BULK_DENSITY: _BULK_DENSITY} if SOLID_FRACTION in declared else {}
-    return (
-        heap
-        | filling
-        | {
-            name: Observable(name, name.replace("_", " "), unit, meaning)
-            for name, (unit, meaning) in declared.items()
-            if name not in heap
-        }
-    )
+    others = {name: _plain(name, *facts) for name, facts in declared.items() if name not in heap}
+    return heap | {each.name: each for each in filling(declared) if each is BULK} | others
+
+
+def filling(declared: Mapping[str, Declared]) -> tuple[Observable, ...]:
+    """Return the observables of a filling: its solid fraction and its bulk density; empty without one."""
+    return (_plain(SOLID_FRACTION, *declared[SOLID_FRACTION]), BULK) if SOLID_FRACTION in declared else ()
+
+
+def _plain(name: str, unit: str, meaning: str) -> Observable:
+    return Observable(name, name.replace("_", " "), unit, meaning)
 
 
 def measurable(

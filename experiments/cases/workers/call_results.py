@@ -7,14 +7,17 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
-from dem_warp import Case, CaseResult, Progress
+from dem_warp import MECHANISMS, Case, CaseResult, Progress
 from dem_warp.result import OnProgress, OnResult
+from experiments.cases.engines.engine import Engine
+from experiments.cases.engines.program import empty_result
 from experiments.cases.workers.batches import relative_work
 from experiments.io.errors import InputError
-from experiments.io.plug_ins import made_in
+from experiments.io.plug_ins import made_in, outside
 
 
 @dataclass(frozen=True)
@@ -25,22 +28,46 @@ class ExpectedProgress(Progress):
     """Wall time of the call, predicted before it began [s]; None if it could not be."""
 
 
-def checked_result(case: Case, result: CaseResult) -> CaseResult:
-    """Return a result, failed where its scene or its engine gave a number that is not finite.
+def checked_result(case: Case, result: CaseResult, engine: Engine | None = None) -> CaseResult:
+    """Return a result, failed where its scene or its engine gave something that it cannot have.
 
     Raise InputError for what is not a result.
     """
     if not isinstance(result, CaseResult):
-        raise InputError("engine", "must hand on a dem_warp.CaseResult for each case", result)
-    wrong = [f"{name} = {value}" for name, value in result.observables.items() if not math.isfinite(value)]
-    if result.positions.size and not np.isfinite(result.positions).all():
+        problem = f"{outside(engine)} must hand on a dem_warp.CaseResult for each case"
+        raise InputError("engine", problem, result)
+    finite = {name: value for name, value in result.observables.items() if _is_finite(value)}
+    wrong = [f"{name} = {value}" for name, value in result.observables.items() if name not in finite]
+    if not (shapes := _wrong_shapes(result)) and not np.isfinite(result.positions).all():
         wrong.append("positions that are not finite")
-    if result.status != "finished" or not wrong:
+    if result.status != "finished" or not (wrong or shapes):
         return result
-    source = result.provenance.get("engine") or made_in(type(case.scene))
-    kept = {name: value for name, value in result.observables.items() if math.isfinite(value)}
-    reason = f"{source} returned {', '.join(wrong)}"
-    return replace(result, status="failed", reason=reason, observables=kept)
+    # a name takes a second to find, which results in order do not need
+    source = outside(engine) or result.provenance.get("engine") or made_in(type(case.scene))
+    reason = f"{source} returned {', '.join(wrong + shapes)}"
+    if shapes:
+        return empty_result("failed", reason, result.provenance)
+    return replace(result, status="failed", reason=reason, observables=finite)
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, Real) and math.isfinite(value)
+
+
+def _wrong_shapes(result: CaseResult) -> list[str]:
+    """Name the arrays of a result that have not a row for each grain."""
+    rows = {"positions": (3,), "orientations": (4,), "sizes": (), "shapes": ()}
+    found = {name: np.shape(getattr(result, name)) for name in rows}
+    count = found["positions"][:1]
+    return [f"{name} of shape {found[name]}" for name, row in rows.items() if found[name] != (*count, *row)]
+
+
+def require_entries(cases: Sequence[Case]) -> None:
+    """Raise InputError for a contact law that the engine does not know, as it is no entry point."""
+    for kind in dict.fromkeys(type(mechanism) for case in cases for mechanism in case.mechanisms):
+        if MECHANISMS.get(kind.name) is not kind:
+            problem = f"{made_in(kind)} must be an entry point of dem_warp.laws in an installed package"
+            raise InputError(f"contact law {kind.name}", problem)
 
 
 class CallResults:
@@ -57,6 +84,8 @@ class CallResults:
     at_once
         Cases that run at the same time: the pace counts from when that many have begun, after every worker's
         start and compilation.
+    engine
+        Engine that answers, for messages; None: dem-warp's own.
     """
 
     def __init__(
@@ -66,8 +95,10 @@ class CallResults:
         on_progress: OnProgress | None,
         expected: float | None = None,
         at_once: int = 1,
+        engine: Engine | None = None,
     ) -> None:
-        self._cases = cases
+        require_entries(cases)
+        self._cases, self._engine = cases, engine
         self.costs = relative_work(cases)
         """Predicted work of each case, (n,)."""
         self.results: dict[int, CaseResult] = {}
@@ -108,6 +139,10 @@ class CallResults:
             running.update(counts)
         return len(self.results) + running.total() - running["waiting"]
 
+    def outside(self, index: int) -> str:
+        """Name the engine or the scene of a case, with its place, if it is of another package; else empty."""
+        return outside(self._engine) if self._engine else outside(type(self._cases[index].scene))
+
     def left(self, members: Sequence[int]) -> list[int]:
         """Return the members of a batch that have given no result yet."""
         return [index for index in members if index not in self.results]
@@ -116,7 +151,7 @@ class CallResults:
         """Take the result of a case, and hand it on."""
         if index in self.results:
             return
-        result = checked_result(self._cases[index], result)
+        result = checked_result(self._cases[index], result, self._engine)
         self.results[index] = result
         self._fractions[index] = 1.0
         if self._on_result is not None:
@@ -125,7 +160,8 @@ class CallResults:
     def take_all(self, members: Sequence[int], results: object) -> None:
         """Take what an engine returned for the members of a batch; InputError for another number."""
         if not isinstance(results, list) or len(results) != len(members):
-            raise InputError("engine", f"must return a list of {len(members)} results", results)
+            made = outside(self._engine)
+            raise InputError("engine", f"{made} must return a list of {len(members)} results", results)
         for index, result in zip(members, results, strict=True):
             self.take(index, result)
 

@@ -11,6 +11,7 @@ from experiments.cases.engines.engine import NO_ANSWER
 from experiments.cases.engines.program import empty_result
 from experiments.cases.workers.call_results import CallResults
 from experiments.io.errors import InputError
+from experiments.io.plug_ins import described, fault_of
 
 FULL = ("failed to allocate", "out of memory")
 """Messages of Warp and of CUDA when the memory of a device is used up."""
@@ -56,8 +57,9 @@ def _attempt(results: CallResults, batch: list[int], run: Callable[[list[int]], 
     except Exception as error:
         if results.fault is not None:
             raise
-        text = f"{type(error).__name__}: {error}"
+        text = described(error)
         if any(words in text.lower() for words in FULL):
             return f"the device has not enough memory for it ({text})"
-        return f"its simulation raised {text}"
+        made = "" if fault_of(error) else results.outside(batch[0])
+        return f"its simulation raised {text}" + (f", in {made}" if made else "")
     return None

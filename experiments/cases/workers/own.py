@@ -97,7 +97,7 @@ class OwnWorkers:
         On a CPU all are one batch, whose processes take the costly cases first.
         """
         expected = None if engine else expected_seconds(cases, self)
-        results = CallResults(cases, on_result, on_progress, expected, self.count)
+        results = CallResults(cases, on_result, on_progress, expected, self.count, engine)
 
         def run(batch: int, members: list[int]) -> None:
             every = checkpoint_interval(len(members) if self.on_gpu else 1)

@@ -188,3 +188,26 @@ def test_a_drum_of_a_study_has_its_options(write_study: WriteStudy) -> None:
     assert isinstance(scene, Drum)
     assert (scene.picture, scene.camera_distance, scene.filling) == ("silhouette", 0.3, 0.4)
     assert scene.inclination == pytest.approx(np.pi / 6, rel=1e-12)
+
+
+def test_a_bulk_density_is_the_solid_fraction_of_a_search_and_itself_as_a_target(
+    write_study: WriteStudy, tmp_path: Path
+) -> None:
+    rows = "".join(f"base,{number},bulk_density,{value},g/cm^3\n" for number, value in ((1, 0.35), (2, 0.42)))
+    path = tmp_path / "m.csv"
+    path.write_text(f"condition,replicate,observable,value,unit\n{rows}", encoding="utf-8")
+    drum = load_study(write_study((TUBE, DRUM), (ANGLE, "")))
+    measured = measured_file.read_measured(path, drum)
+    assert measured.observables == ("solid_fraction",)
+    # grains of 700 kg/m3
+    [[loose], [dense]] = measured.values["base"]  # noqa: PD011  (an array)
+    assert (loose, dense) == pytest.approx((0.5, 0.6), rel=1e-12)
+    target = '[target]\nobservable = "bulk_density"\nfile = "m.csv"\n'
+    for replaced in ([(TUBE, DRUM)], []):
+        study = load_study(write_study(*replaced, (ANGLE, target)))
+        leading = measured_target.with_measurements(study)[0].target.leading
+        assert (leading.observable, leading.unit, leading.measured.n) == ("bulk_density", "kg/m^3", 2)
+        assert leading.measured.mean == pytest.approx(385.0, rel=1e-12)
+    path.write_text(path.read_text("utf-8").replace("g/cm^3", "kg/m^3"), encoding="utf-8")
+    with pytest.raises(InputError, match="bulk_density must be between 7 and 700 kg"):
+        measured_file.read_measured(path, drum)

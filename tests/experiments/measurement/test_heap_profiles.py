@@ -20,7 +20,7 @@ from experiments.studyfile import load_study, observables, study
 from imaging import save_picture, silhouette
 from imaging.flank.heap_shape import SPACING, STATIONS, profile_heights
 
-SIZE = ValueLimits(grain=1e-4, length=0.14, time=np.inf)
+SIZE = ValueLimits(grain=1e-4, length=0.14, time=np.inf, density=1e3)
 SETTINGS = study.MeasurementSection(azimuths=4, pixels=400, outline=True)
 NAMES = [each.name for each in observables.OUTLINE]
 TARGET = '[target]\nobservable = "outline"\nprofiles = "p.csv"\n'

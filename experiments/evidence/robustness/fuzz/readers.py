@@ -118,7 +118,7 @@ def profiles(folder: Path) -> Reader:
     def read(path: Path) -> object:
         if path.name.startswith("drum"):
             return read_drum_profiles(path, 0.03)
-        return read_heap_profiles(path, "flank", ValueLimits(1e-4, 0.2, math.inf))
+        return read_heap_profiles(path, "flank", ValueLimits(1e-4, 0.2, math.inf, 1e3))
 
     return Reader({name: text.encode() for name, text in texts.items()}, read)
 
