@@ -26,9 +26,9 @@ STUDY = ROOT / "experiments" / "studies" / "buckwheat" / "study.toml"
 
 
 @cache
-def _room(code: CodeType) -> str:
-    """Room of a function of this repository; empty for others."""
-    path = Path(code.co_filename)
+def _room(file: str) -> str:
+    """Room of a file of this repository; empty for others."""
+    path = Path(file)
     if not path.is_relative_to(ROOT):
         return ""
     package, *inside = path.relative_to(ROOT).parts
@@ -41,29 +41,30 @@ def _traced(steps: dict[tuple[CodeType | None, CodeType], str]) -> Iterator[None
 
     def note(frame: FrameType, event: str, _: Any) -> None:
         code = frame.f_code
-        if event != "call" or not _room(code):
+        if event != "call" or not _room(code.co_filename):
             return
         names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
         if any(isinstance(frame.f_locals.get(name), Study) for name in names):
             caller = frame.f_back
-            while caller is not None and not _room(caller.f_code):
+            while caller is not None and not _room(caller.f_code.co_filename):
                 caller = caller.f_back
-            steps.setdefault((caller and caller.f_code, code), _room(code))
+            steps.setdefault((caller and caller.f_code, code), _room(code.co_filename))
 
-    sys.setprofile(note)
-    threading.setprofile(note)
+    sys.settrace(note)
+    threading.settrace(note)
     try:
         yield
     finally:
-        sys.setprofile(None)
-        threading.setprofile(None)  # type: ignore[arg-type]
+        sys.settrace(None)
+        threading.settrace(None)  # type: ignore[arg-type]
 
 
 def rooms_of_a_calibration() -> list[str]:
     """Rooms of all steps, in order."""
     steps: dict[tuple[CodeType | None, CodeType], str] = {}
     words = f'"{sys.executable}" "{stand_in.__file__}"'
-    study = load_study(STUDY, "bench").with_engine({"command": words})
+    study = load_study(STUDY, "bench", {"measurement": {"azimuths": 2, "pixels": 200}})
+    study = study.with_engine({"command": words})
     with TemporaryDirectory() as folder, _traced(steps):
         calibrate(study, Path(folder) / "out", device="cpu", workers=2)
     return list(steps.values())

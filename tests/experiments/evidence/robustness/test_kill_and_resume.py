@@ -50,8 +50,8 @@ def test_a_killed_campaign_ends_as_one_that_was_let_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(kill_and_resume, "MOST", 1)
-    whole = tmp_path / "whole"
-    assert fault_of(start(CAMPAIGN, whole), whole) == ""
-    kills = killed_run(0, CAMPAIGN, tmp_path / "killed", content(whole), 6.0, random.Random(3))
+    whole, words = tmp_path / "whole", (*CAMPAIGN[:-1], "1")
+    assert fault_of(start(words, whole), whole) == ""
+    kills = killed_run(0, words, tmp_path / "killed", content(whole), 6.0, random.Random(3))
     assert kills
     assert [kill.fault for kill in kills if kill.fault] == []
