@@ -17,6 +17,7 @@ from commandline import dem_warp
 from cone_engine import SEEDS, cone_engine, observe, without_pages
 
 from dem_warp import simulation
+from dem_warp.provenance import engine_fingerprint
 from experiments.cases import execute
 from experiments.cases.engines import engines
 from experiments.cases.show import heap
@@ -131,6 +132,7 @@ def _stand_ins(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     def measure(_: Any, result: Any, names: tuple[str, ...]) -> tuple[np.ndarray, str]:
         return result.observables["truth"] + np.arange(len(names)), ""
 
+    engine_fingerprint()  # once, before the processes part
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(engines._DRIVERS, "cones", cone_engine)
         patch.setattr(execute, "observe", observe)
