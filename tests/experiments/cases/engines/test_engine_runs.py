@@ -47,7 +47,7 @@ def test_results_are_checked_whoever_made_them(small_study: Study) -> None:
     scene = replace(odd, provenance={})
     bad = workers.simulate(cases, lambda cases, **_: [scene, heap])[0]
     # the module that has the scene, and its package
-    assert bad.reason.startswith("dem_warp.scenes.lifted_cylinder (package dem-warp) returned t55")
+    assert bad.reason.startswith("dem_warp.scenes.lifted_cylinder returned t55")
     for wrong in (None, [heap], [heap, "heap"]):
         with pytest.raises(InputError, match="engine: must"):
             workers.simulate(cases, lambda cases, wrong=wrong, **_: wrong)
