@@ -14,9 +14,10 @@ ROOT = Path(__file__).parents[1]
 GENERATED = Path(__file__).parent / "generated"
 SHOWN = GENERATED / "shown"
 sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
-# Pages run in folders of their own: their commands are those of this environment and of this tree.
+# Pages run in folders of their own: their commands are those of this environment and tree; with an empty
+# PAGES_PYTHONPATH, those of what is installed.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-os.environ["PYTHONPATH"] = str(ROOT)
+os.environ["PYTHONPATH"] = os.environ.get("PAGES_PYTHONPATH", str(ROOT))
 os.environ["DEM_WARP"] = str(ROOT)
 os.environ["SHOWN"] = str(SHOWN)
 os.environ["BASH_ENV"] = str(ROOT / "docs" / "strict.sh")

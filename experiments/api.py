@@ -5,6 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Unpack
 
+from experiments.io.own_packages import require_own_packages
+
+require_own_packages()  # before the imports that a package of others under these names would end
+
 from experiments.runs.bridging import Bridge, BridgeOrder, prepare_bridge, run_bridge
 from experiments.runs.calibration import Calibration, StageHook, run_calibration
 from experiments.runs.choices import check_campaign, prepare

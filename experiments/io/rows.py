@@ -48,7 +48,7 @@ def read_rows(
     columns.
     """
     header: list[str] = []
-    lines = list(_lines(path))
+    lines = list(_lines(path, numbered=renamed is not None))
     heads = (renamed(cells) for _, cells in lines) if renamed else iter(())
     found = next((names for names in heads if set(needed) <= set(names)), None)
     for line, cells in lines:
@@ -65,8 +65,11 @@ def read_rows(
             yield Row(path, line, dict(zip(header, cells, strict=False)))
 
 
-def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Read lines of cells; numbers may have decimal commas where semicolons or tabs separate the cells."""
+def _lines(path: Path, numbered: bool) -> Iterator[tuple[int, list[str]]]:
+    """Read lines of cells; numbers may have decimal commas where semicolons or tabs separate the cells.
+
+    With `numbered` a first cell as ``#40``, the number of a sieve, begins no comment.
+    """
     text = read_text(path)
     delimiter = _delimiter(text)
     try:
@@ -75,7 +78,8 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
             cells = [cell.strip() for cell in row]
             if delimiter != ",":
                 cells = [_with_point(cell) for cell in cells]
-            if any(cells) and not cells[0].startswith("#"):
+            number = numbered and re.fullmatch(r"# ?\d+", cells[0] if cells else "") and any(cells[1:])
+            if any(cells) and (number or not cells[0].startswith("#")):
                 yield reader.line_num, cells
     except csv.Error as error:
         raise InputError(str(path), f"is not a CSV file: {error}") from None

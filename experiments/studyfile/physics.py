@@ -6,6 +6,7 @@ A field's type names its dimension; its bounds are the hard physical limits, for
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -20,7 +21,7 @@ from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.proportions import narrowness
 from experiments.studyfile.scene_sections import SceneSection, scene_section
-from experiments.studyfile.schema import Generated, Length, Number, Section, StudyFile, nested_error
+from experiments.studyfile.schema import Generated, Length, Mass, Number, Section, StudyFile, nested_error
 from experiments.studyfile.sizes_section import SizesSection
 from experiments.studyfile.solver_section import SolverSection
 from experiments.studyfile.wall_sections import (
@@ -102,6 +103,9 @@ class GrainSection(MaterialSection, ShapeSection):
     spread leaves the mass of a number of grains as it is."""
     size_sd: Number = Field(default=0.05, ge=0.0, le=LARGEST_SIZE)
     """Standard deviation of the size."""
+    thousand_grain_mass: Mass | None = Field(default=None, gt=0.0)
+    """Mass of 1,000 grains, in place of size_mean: the density of the grain gives the size of the shape, a
+    sphere by default, and size_sd is a multiple of it."""
     elongation: Number = Field(default=0.0, ge=0.0)
     """Every shape is drawn out by this part along its longest axis, at the same volume."""
     sizes: SizesSection | None = None
@@ -110,6 +114,9 @@ class GrainSection(MaterialSection, ShapeSection):
     @model_validator(mode="after")
     def _has_its_shapes(self) -> Self:
         shape = self.shape()
+        replaced = {"size_mean", "size_mean_of"} & self.model_fields_set
+        if self.thousand_grain_mass is not None and (self.sizes is not None or replaced):
+            raise ValueError("must have thousand_grain_mass or other sizes, not both")
         if self.sizes is None:
             return self
         if isinstance(shape, ShapeMixture):
@@ -123,6 +130,8 @@ class GrainSection(MaterialSection, ShapeSection):
 
     def shape(self) -> ClumpShape | ShapeMixture:
         """Build the grain's shape, or the mixture of its shapes."""
+        if self.thousand_grain_mass is not None and not (self.shapes or self.clump or self.sphere):
+            return _elongated(_sphere(1e-3), self.elongation)
         if not self.shapes:
             return _elongated(self.one_shape(), self.elongation)
         if self.clump is not None or self.sphere is not None:
@@ -153,9 +162,19 @@ class GrainSection(MaterialSection, ShapeSection):
         if self.sizes is not None and isinstance(shape, ClumpShape):
             return self.sizes.population(shape, self.material())
         mean, spread = self.size_mean, self.size_sd
+        if self.thousand_grain_mass is not None:
+            mean, shape = size_of_mean_mass(1.0, spread), self._scaled(shape, self.thousand_grain_mass)
         if self.size_mean_of == "masses":
             mean = size_of_mean_mass(mean, spread)
         return GrainPopulation(shape=shape, material=self.material(), size_mean=mean, size_sd=spread)
+
+    def _scaled(self, shape: ClumpShape | ShapeMixture, mass: float) -> ClumpShape | ShapeMixture:
+        """Scale a shape, or all of a mixture, to a mass of 1,000 grains [kg]."""
+        volume = GrainPopulation(shape=shape, material=self.material()).mean(lambda one: one.volume)
+        scale = math.cbrt(1e-3 * mass / (self.density * volume))
+        if isinstance(shape, ClumpShape):
+            return shape.scaled(scale)
+        return replace(shape, shapes=tuple(one.scaled(scale) for one in shape.shapes))
 
 
 # The integrals over a shape take milliseconds, and every case of a campaign needs them.

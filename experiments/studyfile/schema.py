@@ -75,6 +75,7 @@ Number = Annotated[float, Dimension("")]
 Length = Annotated[float, Dimension("length")]
 Pressure = Annotated[float, Dimension("pressure")]
 Density = Annotated[float, Dimension("density")]
+Mass = Annotated[float, Dimension("mass")]
 Time = Annotated[float, Dimension("time")]
 Angle = Annotated[float, Dimension("angle")]
 """A measured angle, in degrees."""

@@ -53,3 +53,18 @@ def test_a_package_that_was_installed_over_ours_is_named(
     assert code == 2
     assert "is not dem-warp's but of the package classical. Uninstall classical" in said
     assert "pip install --force-reinstall --no-deps dem-warp" in said
+
+
+def test_a_folder_next_to_a_script_is_named(installed: Installed, tmp_path: Path) -> None:
+    (tmp_path / "doe").mkdir()
+    (tmp_path / "doe" / "__init__.py").write_text("FACTORS = 2\n", encoding="utf-8")
+    (tmp_path / "script.py").write_text("from experiments.api import calibrate\n", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, tmp_path / "script.py"],
+        env=os.environ | {"PYTHONPATH": str(installed.sites[0])},
+        capture_output=True,
+        text=True,
+    )
+    last = done.stderr.strip().splitlines()[-1]
+    assert f"package doe: {tmp_path / 'doe' / '__init__.py'} is not dem-warp's" in last
+    assert "cannot import" not in done.stderr

@@ -12,18 +12,23 @@ from pathlib import Path
 from experiments.grains.sizes.distribution import Tabulated
 from experiments.io.errors import InputError
 from experiments.io.rows import Row, read_rows
-from experiments.io.texts import read_text
 from experiments.io.units import Quantity
 
 ROUNDING = 0.5
 """Largest deviation of a sum of rounded percentages from 100 [%]."""
 
-_MESH_NUMBER = re.compile(r'^ *"?(#\d+)"? *[,;\t] *"?[\d.]', re.MULTILINE)
-
 SIEVE_COLUMNS = ("opening", "retained", "retained_percent", "passing_percent", "cumulative_retained_percent")
 COUNT_COLUMNS = ("diameter", "from", "to", "count")
 PANS, SUMS = ("pan", "receiver", "tray", "bottom", "base", "fines"), ("total", "sum")
 """Openings in words: none at all, and rows that are no sieves."""
+_MESHES = {
+    "3.5": 5.6, "4": 4.75, "5": 4.0, "6": 3.35, "7": 2.8, "8": 2.36, "10": 2.0, "12": 1.7, "14": 1.4,
+    "16": 1.18, "18": 1.0, "20": 0.85, "25": 0.71, "30": 0.6, "35": 0.5, "40": 0.425, "45": 0.355, "50": 0.3,
+    "60": 0.25, "70": 0.212, "80": 0.18, "100": 0.15, "120": 0.125, "140": 0.106, "170": 0.09, "200": 0.075,
+    "230": 0.063, "270": 0.053, "325": 0.045, "400": 0.038, "450": 0.032, "500": 0.025, "635": 0.02,
+}  # fmt: skip
+"""Opening of each sieve by its number [mm]: ASTM E11, table 1, alternative designations."""
+_MESH = re.compile(r"(?:#|no\.?)\s*([\d.]+)|([\d.]+)[\s-]*mesh", re.IGNORECASE)
 _UNIT = re.compile(r"[(\[]([^()\[\]]*)[)\]]")
 """Unit in the brackets of a column's name."""
 
@@ -33,11 +38,10 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
 
     Columns: ``opening``, and one of ``retained`` (mass on the sieve), ``retained_percent``,
     ``passing_percent`` and ``cumulative_retained_percent``, or what sheets call them (see `_sieve_column`);
-    of several the first in this order counts. The opening of a pan is 0 or in words. ``unit`` is that of
-    openings without one. Return the distribution by mass between the finest and the coarsest opening, and the
-    part of the mass beyond them.
+    of several the first in this order counts. The opening of a pan is 0 or in words; ``#40`` and ``40 mesh``
+    are sieves of ASTM E11. ``unit`` is that of openings without one. Return the distribution by mass between
+    the finest and the coarsest opening, and the part of the mass beyond them.
     """
-    _refuse_mesh_numbers(path)
     header = _Header(_sieve_column)
     found = list(read_rows(path, ("opening",), SIEVE_COLUMNS, header))
     column = _one_of(path, found, SIEVE_COLUMNS[1:])
@@ -103,18 +107,16 @@ def _sieve_column(name: str, unit: str) -> str:
 
 
 def _opening(row: Row, unit: str | None) -> float:
-    """Read an opening [m]: 0 for a pan, or for what is finer than a sieve."""
+    """Read an opening [m]: 0 for a pan, or for what is finer than a sieve; also by the number of a mesh."""
     word = row["opening"].lower()
+    if mesh := _MESH.fullmatch(f"{word} mesh" if unit == "mesh" else word):
+        number = mesh[1] or mesh[2]
+        if number not in _MESHES:
+            raise row.error(
+                "must be a sieve of ASTM E11, from 3.5 to 635, or a length with its unit", "opening"
+            )
+        return 1e-3 * _MESHES[number]
     return 0.0 if word in PANS or word.startswith("<") else _length(row, "opening", unit, zero=True)
-
-
-def _refuse_mesh_numbers(path: Path) -> None:
-    """Refuse rows that begin with the number of a mesh, e.g. ``#40``, which look like comments."""
-    text = read_text(path)
-    if found := _MESH_NUMBER.search(text):
-        line = text.count("\n", 0, found.start()) + 1
-        problem = "needs a length with its unit, e.g. 0.425 mm, not the number of a mesh"
-        raise InputError(f"{path}:{line}: opening", problem, found[1])
 
 
 def read_counts(path: Path, unit: str | None = None, column: str | None = None) -> Tabulated:

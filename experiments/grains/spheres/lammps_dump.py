@@ -1,4 +1,4 @@
-"""Text dumps of LIGGGHTS and LAMMPS (``dump custom``): the last complete frame.
+"""Text dumps of LIGGGHTS and LAMMPS (``dump custom``, ``dump yaml``): the last complete frame.
 
 Columns and scaling follow the manuals of LAMMPS (``dump``) and LIGGGHTS: x or xu are lengths, xs and xsu
 parts of the box.
@@ -7,8 +7,9 @@ parts of the box.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,36 @@ def _frames(path: Path) -> Iterator[_Frame]:
     yield frame
 
 
+ITEMS = {
+    "timestep": "TIMESTEP", "units": "UNITS", "natoms": "NUMBER OF ATOMS", "box": "BOX BOUNDS",
+    "data": "ATOMS",
+}  # fmt: skip
+"""Keys of ``dump yaml`` (https://docs.lammps.org/dump.html) that a text dump has too."""
+
+
+def _yaml_frames(path: Path) -> Iterator[_Frame]:
+    """Yield the frames of ``dump yaml`` as those of a text dump."""
+    frame, rows = _Frame(1), [""]
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            key, _, value = line.partition(":")
+            if line.startswith("---") and frame.items:
+                yield frame
+                frame = _Frame(number)
+            elif line[0].isalpha():
+                rows = [value.strip()] if value.strip() else []
+                frame.items[ITEMS.get(key, key)] = rows
+                frame.columns = _cells(value) if key == "keywords" else frame.columns
+                frame.first_row = number + 1
+            elif line.lstrip().startswith("- ["):
+                rows.append(" ".join(_cells(line.partition("-")[2])))
+    yield frame
+
+
+def _cells(row: str) -> list[str]:
+    return row.translate(str.maketrans("[],", "   ")).split()
+
+
 def _item(words: list[str]) -> tuple[str, list[str]]:
     """Split an item into its name and the words after it."""
     for name in ("ATOMS", "BOX BOUNDS", "NUMBER OF ATOMS"):
@@ -78,9 +109,9 @@ def _item(words: list[str]) -> tuple[str, list[str]]:
     return " ".join(words), []
 
 
-def _read(path: Path) -> SphereFile:
+def _read(path: Path, frames: Callable[[Path], Iterator[_Frame]] = _frames) -> SphereFile:
     count, chosen, last = 0, None, None
-    for frame in _frames(path):
+    for frame in frames(path):
         count, last = count + 1, frame
         if frame.is_whole and frame.columns:
             chosen, position = frame, count
@@ -133,3 +164,8 @@ def _box(frame: _Frame, place: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 DUMP = Format("dump of LIGGGHTS or LAMMPS", lambda head: head.startswith("ITEM:"), _read)
+YAML_DUMP = Format(
+    "dump yaml of LAMMPS",
+    lambda head: head.startswith("---\ncreator: LAMMPS"),
+    partial(_read, frames=_yaml_frames),
+)

@@ -13,7 +13,7 @@ from typing import IO, cast
 
 from experiments.grains.spheres.column_table import TABLE
 from experiments.grains.spheres.frame_tables import MERCURY, XYZ
-from experiments.grains.spheres.lammps_dump import DUMP
+from experiments.grains.spheres.lammps_dump import DUMP, YAML_DUMP
 from experiments.grains.spheres.numpy_file import NUMPY
 from experiments.grains.spheres.plain_lines import PLAIN
 from experiments.grains.spheres.sphere_file import LARGEST, Format, SphereFile
@@ -24,7 +24,19 @@ from experiments.io.errors import InputError
 from experiments.io.files import check_file
 from experiments.io.texts import decoded
 
-FORMATS: tuple[Format, ...] = (DUMP, VTK, NUMPY, YADE_TEXT, YADE_TEMPLATE, XML, XYZ, MERCURY, PLAIN, TABLE)
+FORMATS: tuple[Format, ...] = (
+    DUMP,
+    YAML_DUMP,
+    VTK,
+    NUMPY,
+    YADE_TEXT,
+    YADE_TEMPLATE,
+    XML,
+    XYZ,
+    MERCURY,
+    PLAIN,
+    TABLE,
+)
 """Formats in order; the first that recognises a file reads it."""
 HEAD = 65536
 """Number of first bytes of a file that show its format."""

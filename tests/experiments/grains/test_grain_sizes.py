@@ -164,9 +164,9 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
         ("opening,retained\n1,3\n", "mm", r"sizes.csv: needs 2 rows or more .*got 1"),
         ("opening\n1\n2\n", "mm", r"sizes.csv: needs one column of retained, .*got none"),
         (
-            "# 3 sieves, dry\nopening,passing_percent\n0.4 mm,2\n#30,20\n#20,100\n",
+            "# 3 sieves, dry\nopening,passing_percent\n0.4 mm,2\n#31,20\n#20,100\n",
             None,
-            r"sizes.csv:4: opening: needs a length with its unit, .*, got #30",
+            r"sizes.csv:4: opening: must be a sieve of ASTM E11, .*, got #31",
         ),
         (
             "opening,retained\n0.5,1 g\n1,12\n2,5 g\n",
@@ -308,6 +308,8 @@ SHEETS = {
     "the pan last": "sieve,weight\n0.5 mm,60\n1 mm,30\n2 mm,0\nReceiver,10\n",
     "what passes": "Sieve size (mm);% passing\n2,0;100\n1,0;70\n0,5;10\n",
     "cumulative": "Size (mm),Cumulative retained (%)\n2,0\n1,30\n0.5,90\nPan,100\n",
+    "by numbers": "# of a lecture\nopening,retained_percent\n#10,0\nNo. 18,30\n35 mesh,60\nPan,10\n",
+    "numbers alone": "Sieve (mesh),% passing\n10,100\n18,70\n35,10\n",
     "a whole sheet": "Sample,river sand\n"
     "Sieve No.,Opening (mm),Mass of sieve (g),Mass retained (g),% retained,% finer\n"
     "10,2,400,0,0,100\n18,1,390,30,30,70\n35,0.5,380,60,60,10\n-,Pan,300,10,10,0\n,Total,,100,100,\n",
@@ -338,3 +340,21 @@ def test_an_analysers_export_has_its_diameter_in_a_named_column(
     assert 2.0 * mean == pytest.approx(1e-3 * (17.0 / 3.0) ** (1.0 / 3.0), rel=0.01)
     with pytest.raises(InputError, match="missing: diameter"):
         read_counts(table(tmp_path, export), None, "Feret")
+
+
+def test_the_mass_of_a_thousand_grains_gives_their_size(write_study: Callable[..., Path]) -> None:
+    # 1,000 spheres of 700 kg/m3 and 23.4572 g have radii of 2 mm
+    radius, mass = 'sphere = "2 mm"\n', '23.4572 g"\nsize_sd = 0.2\n'
+    for shape in ("", 'sphere = "9 mm"\n'):
+        path = write_study((radius, f'{shape}thousand_grain_mass = "{mass}'))
+        grains = load_study(path).case({}, 1).grains
+        assert grains.mixture.shapes[0].radii[0] == pytest.approx(2e-3, rel=1e-5)
+        masses = (
+            700.0
+            * grains.mixture.shapes[0].volume
+            * grains.draw_sizes(100_000, np.random.default_rng(1)) ** 3
+        )
+        # the mean of 100,000 masses with a spread of .6 has an error of .2 %
+        assert masses.mean() == pytest.approx(23.4572e-6, rel=0.008)
+    with pytest.raises(StudyError, match="thousand_grain_mass or other sizes, not both"):
+        load_study(write_study((radius, f'size_mean = 1.0\nthousand_grain_mass = "{mass}')))

@@ -69,6 +69,7 @@ WITHOUT_RADII = {
     "atom 1 FILE": "radius",
     "xyz 1 FILE.xyz": "without radii",
     f"custom 1 FILE.bin {COLUMNS[0]}": "a binary dump",
+    f"custom/zstd 1 FILE.zst {COLUMNS[0]}": "a compressed file",
 }
 """Dumps that cannot be read, and a word of the message."""
 
@@ -143,13 +144,51 @@ def test_the_last_frame_of_a_dump_that_was_cut_off_is_left_out(tmp_path: Path) -
         pytest.param(program, dump, marks=pytest.mark.program(program))
         for program in PHYSICS
         for dump in WITHOUT_RADII
-        if (program, dump) != ("liggghts", "atom 1 FILE")  # LIGGGHTS has no such style
+        if program == "lmp" or not dump.startswith(("atom", "custom/zstd"))  # LIGGGHTS has no such styles
     ],
 )
 def test_a_dump_that_cannot_be_read_is_named(program: str, dump: str, tmp_path: Path) -> None:
     path = written(program, (dump, "si", "f f f", FIXED), tmp_path)[0]
     with pytest.raises(InputError, match=WITHOUT_RADII[dump]):
         read_spheres(path)
+
+
+FRAME = """---
+creator: LAMMPS
+timestep: {step}
+units: cgs
+natoms: 3
+boundary: [ f, f, f, ]
+thermo:
+  - keywords: [ Step, Atoms, ]
+    data: [ 0, 3, ]
+box:
+  - [ -1, 2 ]
+  - [ -3, 2 ]
+  - [ -1, 4 ]
+keywords: [ id, type, {columns}, radius, ]
+data:
+{rows}
+...
+"""
+"""As in https://docs.lammps.org/dump.html; the LAMMPS of Debian 12 has no ``dump yaml``."""
+
+
+@pytest.mark.parametrize("columns", ["x, y, z", "xs, ys, zs"])
+def test_a_yaml_dump_of_lammps_comes_back_from_its_last_complete_frame(columns: str, tmp_path: Path) -> None:
+    low, high = np.array([-1.0, -3.0, -1.0]), np.array([2.0, 2.0, 4.0])
+    table = 100.0 * SPHERES
+    if columns.startswith("xs"):
+        table[:, :3] = (table[:, :3] - low) / (high - low)
+    rows = "\n".join(
+        f"  - [ {n} , 1 , {' , '.join(f'{v:.9g}' for v in row)} , ]" for n, row in enumerate(table)
+    )
+    frames = [FRAME.format(step=step, columns=columns, rows=rows) for step in (0, 1)]
+    (tmp_path / "dump.yaml").write_text("".join(frames)[:-60], encoding="utf-8")
+    found = read_spheres(tmp_path / "dump.yaml")
+    assert "frame 1 of 2 (timestep 0), the last complete one" in found.description
+    assert (found.unit, found.type_counts) == (0.01, {"1": 3})
+    np.testing.assert_allclose(in_metres(tmp_path / "dump.yaml", 1.0), SPHERES, rtol=1e-8, atol=1e-12)
 
 
 YADE = """
