@@ -160,8 +160,8 @@ class CallResults:
     def take_all(self, members: Sequence[int], results: object) -> None:
         """Take what an engine returned for the members of a batch; InputError for another number."""
         if not isinstance(results, list) or len(results) != len(members):
-            made = outside(self._engine)
-            raise InputError("engine", f"{made} must return a list of {len(members)} results", results)
+            rule = f"{outside(self._engine)} must return a list of {len(members)} results".lstrip()
+            raise InputError("engine", rule, results)
         for index, result in zip(members, results, strict=True):
             self.take(index, result)
 
