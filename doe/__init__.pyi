@@ -48,6 +48,7 @@ from .response.analysis.diagnostics import robust_coefficients as robust_coeffic
 from .response.analysis.formula import LinearFit as LinearFit
 from .response.analysis.formula import fit_formula as fit_formula
 from .response.analysis.formula import fit_mixture as fit_mixture
+from .response.factor_surface import FactorSurface as FactorSurface
 from .response.joint_fit import Goal as Goal
 from .response.joint_fit import JointFit as JointFit
 from .response.joint_fit import joint_fit as joint_fit
@@ -66,6 +67,7 @@ from .samples.replicate_noise import detectable_effect as detectable_effect
 from .samples.replicate_noise import effect_power as effect_power
 from .samples.replicate_noise import noise_floor as noise_floor
 from .samples.sample import Sample as Sample
+from .samples.sample import StatedValue as StatedValue
 from .samples.two_means import Comparison as Comparison
 from .samples.two_means import compare_means as compare_means
 from .screen.screened_effects import ScreenResult as ScreenResult

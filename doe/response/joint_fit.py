@@ -1,7 +1,7 @@
 """Several responses together: their best common setting, their agreement, and what stays open."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
@@ -170,6 +170,22 @@ class JointFit:
         """Return True if all responses agree with their targets at a point (default: the smallest chi2)."""
         return bool(self._accepted(tuple(self.goals), self._misfits_at(self._coded(point))).all())
 
+    def without(self, name: str) -> "JointFit":
+        """Return the joint fit of the other responses, over the same region."""
+        self._check_names((name,))
+        return replace(self, goals={other: goal for other, goal in self.goals.items() if other != name})
+
+    def conflict(self, name: str) -> tuple[float, float]:
+        """Return by how many standard errors the other responses disagree with one, and the p value of that.
+
+        The first is the root of what the response adds to the smallest chi2 of the region explored. It is 0
+        where the others leave open what the response is about.
+        """
+        others = self.without(name)
+        added = self._smallest_chi2 - others._smallest_chi2
+        found, size = self.goals[name].misfit(self.coded_point[None]), float(np.sqrt(max(added, 0.0)))
+        return size, found[3].p(size, float(found[2][0]))
+
     @cached_property
     def shrinkage(self) -> pd.DataFrame:
         """Share of the compatible region after each response: the first, then the one that shrinks it most.
@@ -307,6 +323,10 @@ class JointFit:
     def _coded(self, point: Mapping[str, float] | None) -> NDArray[np.float64]:
         """Return a point in coded units: that of the smallest chi2 unless one is given."""
         return self.coded_point if point is None else coded_setting("the point", point, self.factors)
+
+    @property
+    def _smallest_chi2(self) -> float:
+        return sum(float(self._chi2(found)[0]) for found in self._misfits_at(self.coded_point).values())
 
     def _chi2(self, found: Misfit) -> NDArray[np.float64]:
         return (found[0] / found[1]) ** 2

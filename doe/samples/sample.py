@@ -47,7 +47,7 @@ class Sample:
         return cls(float(numbers.mean()), float(numbers.std(ddof=1)), int(numbers.size))
 
     @property
-    def df(self) -> int:
+    def df(self) -> float:
         """Degrees of freedom of the standard deviation."""
         return self.n - 1
 
@@ -55,3 +55,21 @@ class Sample:
     def se(self) -> float:
         """Standard error of the mean."""
         return self.sd / math.sqrt(self.n)
+
+
+@dataclass(frozen=True)
+class StatedValue(Sample):
+    """A single value whose standard deviation is stated, not estimated from a scatter: it counts as known."""
+
+    n: int = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mean", checked_number("a stated value", self.mean))
+        object.__setattr__(self, "sd", checked_number("a stated value's sd", self.sd, least=0.0))
+        if self.n != 1:
+            raise DesignError(f"n of a stated value must be 1, got {self.n!r}")
+
+    @property
+    def df(self) -> float:
+        """Degrees of freedom of the standard deviation: infinite."""
+        return math.inf

@@ -80,21 +80,16 @@ def climb(
 ) -> ClimbResult:
     """Walk along the leading response's steepest path, every step at once, and on if the target is ahead.
 
+    Factors with a direct reading are held there; where that path does not cross the target, they move too.
     StageEnd where the path has no room, or fewer than two steps gave a value.
     """
-    settings, response = study.campaign.climb, study.target.leading
-    line, rule = _line(study, screening.leading.screen, kept)
-    batches, tables = [_first_points(study, line)], []
-    for _ in range(1 + settings.extensions):
-        steps = batches[-1][list(kept)]
-        tables.append(runner(plan_cases(study, STAGE, steps, settings.replicates, [response])))
-        points, cases = pd.concat(batches).sort_index(), pd.concat(tables, ignore_index=True)
-        path = _path_table(points, cases, response, target.leading.mean)
-        end = _end(path, measured(cases, response)[["run", response.observable]], noise.leading, settings)
-        more = _further_points(line, path, settings)
-        if end is not ClimbEnd.BOUNDED or more.empty:
-            break
-        batches.append(more)
+    response, held = study.target.leading, _held(study, kept)
+    line, rule = _line(study, screening.leading.screen, kept, held)
+    path, cases, end = _walk(study, line, noise, target, runner)
+    if held and end is not ClimbEnd.CROSSED:
+        line, rule = _line(study, screening.leading.screen, kept, {})
+        path, cases, end = _walk(study, line, noise, target, runner)
+        rule += f" With {', '.join(held)} held at the direct readings it did not cross the target."
     place, crossing = _crossing(path, kept) if end is ClimbEnd.CROSSED else (None, None)
     best = int(path["error"].abs().idxmin())
     step = _stride(path, kept)
@@ -105,6 +100,25 @@ def climb(
         _end_decision(path, cases, end, response, target.leading, crossing, place, best),
     )
     return ClimbResult(cases, kept, path, step, end, crossing, place, best, decisions)
+
+
+def _walk(
+    study: Study, line: _Line, noise: NoiseFloorResult, target: TargetResult, runner: Runner
+) -> tuple[pd.DataFrame, pd.DataFrame, ClimbEnd]:
+    """Simulate a path in batches; return its steps, its cases and its end."""
+    settings, response = study.campaign.climb, study.target.leading
+    batches, tables = [_first_points(study, line)], []
+    for _ in range(1 + settings.extensions):
+        steps = batches[-1][list(line.kept)]
+        tables.append(runner(plan_cases(study, STAGE, steps, settings.replicates, [response])))
+        points, cases = pd.concat(batches).sort_index(), pd.concat(tables, ignore_index=True)
+        path = _path_table(points, cases, response, target.leading.mean)
+        end = _end(path, measured(cases, response)[["run", response.observable]], noise.leading, settings)
+        more = _further_points(line, path, settings)
+        if end is not ClimbEnd.BOUNDED or more.empty:
+            break
+        batches.append(more)
+    return path, cases, end
 
 
 def require_crossing(study: Study, result: ClimbResult, target: TargetResult) -> None:
@@ -139,21 +153,43 @@ def require_crossing(study: Study, result: ClimbResult, target: TargetResult) ->
     )
 
 
-def _line(study: Study, screen: ScreenResult, kept: tuple[str, ...]) -> tuple[_Line, str]:
-    """Return the path to walk and the rule that chose it."""
+def _held(study: Study, kept: tuple[str, ...]) -> dict[str, float]:
+    """Return the direct readings of kept factors, the most precise of each; none if no factor is left."""
+    limits = reach_limits(study)
+    ranked = sorted(study.direct, key=lambda one: -math.hypot(one.measured.se, one.model_sd))
+    held = {
+        one.factor: min(max(one.measured.mean, limits[one.factor][0]), limits[one.factor][1])
+        for one in ranked
+        if one.factor in kept
+    }
+    return held if set(held) < set(kept) else {}
+
+
+def _line(
+    study: Study, screen: ScreenResult, kept: tuple[str, ...], held: Mapping[str, float]
+) -> tuple[_Line, str]:
+    """Return the path to walk, some factors held, and the rule that chose it."""
     settings, limits = study.campaign.climb, reach_limits(study)
     start, step = fixed_values(settings.start, kept), fixed_values(settings.step, kept)
     if start is not None and step is not None:
         rule = "The study fixes start and step of the climb; the screening gives the signs."
         return _Line(screen, kept, start, step, limits), rule
     slopes = screen.coded_coefficients[list(kept)]
-    direction = slopes / slopes.abs().max()
+    strongest = slopes.drop(list(held)).abs().max()
+    if held and not strongest > 0.0:
+        return _line(study, screen, kept, {})
+    direction = slopes / strongest
     start = {f.name: float(f.to_natural(-direction[f.name])) for f in kept_factors(study, kept)}
     rule = (
         f"The climb follows the line through the middle along the screening effects; {settings.steps} points "
         "take the strongest factor through its range."
     )
-    return _Line(screen, kept, start, 2.0 / (settings.steps - 1), limits), rule
+    if held:
+        rule += f" Held at the direct readings: {listed(held)}."
+    # a factor that is held starts at its limits; the step is that of the strongest factor of all
+    limits |= {name: (value, value) for name, value in held.items()}
+    move = 2.0 / (settings.steps - 1) * float(slopes.abs().max() / strongest)
+    return _Line(screen, kept, {**start, **held}, move, limits), rule
 
 
 def _first_points(study: Study, line: _Line) -> pd.DataFrame:
@@ -210,7 +246,7 @@ def _end(path: pd.DataFrame, used: pd.DataFrame, noise: NoiseFloor, settings: Cl
     return ClimbEnd.BOUNDED
 
 
-def _pooled_variance(used: pd.DataFrame, noise: NoiseFloor) -> tuple[float, int]:
+def _pooled_variance(used: pd.DataFrame, noise: NoiseFloor) -> tuple[float, float]:
     """Return the variance of one case from the noise floor and the climb's replicates, and its df."""
     run, values = used["run"], used.iloc[:, -1]
     within = values - values.groupby(run).transform("mean")

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
 from doe import JointFit
+from experiments.calibrate.direct_checks import DirectCheck, disagreement_text
 from experiments.calibrate.results import Decision
 from experiments.calibrate.values import fixed_values, p_text
+from experiments.io.texts import enumeration
 from experiments.studyfile.campaign import OptimumSettings
 
 STAGE = "optimum"
@@ -55,6 +57,25 @@ def direction_text(direction: pd.Series) -> str:
         return f"{moves} alone"
     shares = " : ".join(f"{abs(part) / abs(named.iloc[0]):.2g}" for part in named)
     return f"{moves} ({shares} in coded units)"
+
+
+def direct_decision(checks: Sequence[DirectCheck]) -> Decision:
+    """Say which direct readings contradict the other measurements, and by how much."""
+    numbers = {f"{check.direct.name}, standard errors off": check.errors for check in checks}
+    numbers |= {f"p of {check.direct.name}": check.p for check in checks}
+    apart = [check for check in checks if check.apart]
+    names = enumeration(f"the {check.direct.title}" for check in checks)
+    outcome = f"No contradiction is found to {names}."
+    if apart:
+        outcome = "; ".join(map(disagreement_text, apart))
+        outcome = f"{outcome[:1].upper()}{outcome[1:]}."
+    return Decision(
+        STAGE,
+        "A direct reading contradicts the others when it raises the smallest chi2 of the region explored by "
+        "more than errors explain; the level is shared among the direct readings.",
+        numbers,
+        outcome,
+    )
 
 
 def _agreement(joint: JointFit, point: Mapping[str, float]) -> Decision:

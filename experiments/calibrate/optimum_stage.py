@@ -8,9 +8,10 @@ from contextlib import suppress
 import numpy as np
 import pandas as pd
 
-from doe import Goal, JointFit, Region, Sample, Surface, TargetError, joint_fit
+from doe import FactorSurface, Goal, JointFit, Region, Sample, Surface, TargetError, joint_fit
 from experiments.calibrate.cases import StageEnd, middle
-from experiments.calibrate.joint import choose_jointly, joint_decisions
+from experiments.calibrate.direct_checks import check_direct
+from experiments.calibrate.joint import choose_jointly, direct_decision, joint_decisions
 from experiments.calibrate.results import (
     Decision,
     FittedResponse,
@@ -44,6 +45,11 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     reach = float(surface.design.coded.abs().to_numpy().max())
     response = study.target.leading
     goals = {name: Goal(found.reduced, target.responses[name]) for name, found in surface.responses.items()}
+    goals |= {
+        direct.name: Goal(FactorSurface(fit.design, direct.factor, direct.model_sd), direct.measured)
+        for direct in study.direct
+        if direct.factor in fit.design.names
+    }
     joint = joint_fit(goals, alpha=1.0 - settings.confidence) if len(goals) > 1 else None
     alpha, radius = 1.0 - settings.confidence, _radius(surface)
     if joint is None:
@@ -75,6 +81,9 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     ]
     if joint is not None:
         decisions += joint_decisions(joint, point, settings)
+    checks = check_direct(study, joint, 1.0 - settings.confidence)
+    if checks:
+        decisions.append(direct_decision(checks))
     if truth is not None:
         decisions.append(_truth_decision(truth, sample.mean, response))
     return OptimumResult(
@@ -88,6 +97,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
         truth=truth,
         decisions=tuple(decisions),
         joint=joint,
+        direct=checks,
     )
 
 

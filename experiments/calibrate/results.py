@@ -22,7 +22,8 @@ from experiments.io.plain_data import indexed, jsonable
 
 if TYPE_CHECKING:
     from doe import Design, Factor, JointFit, Region, ScreenResult, Surface
-    from experiments.studyfile.campaign import CampaignSettings, Response
+    from experiments.calibrate.direct_checks import DirectCheck
+    from experiments.studyfile.campaign import CampaignSettings, Direct, Response
 
 Found = TypeVar("Found")
 
@@ -281,6 +282,8 @@ class OptimumResult(StageResult):
     decisions: tuple[Decision, ...]
     joint: JointFit | None = None
     """All responses together; None where there is one."""
+    direct: tuple[DirectCheck, ...] = ()
+    """Direct readings."""
 
     @property
     def pins_nothing(self) -> bool:
@@ -297,6 +300,8 @@ class OptimumResult(StageResult):
             tables["joint_responses"] = self.joint.tests(self.point)
             tables["joint_shrinkage"] = self.joint.shrinkage
             tables["joint_directions"] = self.joint.directions
+        if self.direct:
+            tables["direct_readings"] = pd.DataFrame([check.row for check in self.direct])
         return tables
 
 
@@ -337,6 +342,8 @@ class Campaign:
     surface: SurfaceResult | None = None
     optimum: OptimumResult | None = None
     verification: VerificationResult | None = None
+    direct: tuple[Direct, ...] = ()
+    """Factors that were measured by themselves."""
 
     @property
     def stages(self) -> dict[str, StageResult]:

@@ -70,7 +70,16 @@ def calibrate(study: Study, runner: Runner, on_stage: StageHook | None = None) -
     except StageEnd as end:
         outcome, reason = end.outcome, end.reason
     cases, target = pd.concat(record.tables, ignore_index=True), record.responses
-    return Campaign(tuple(study.factors), target, study.campaign, outcome, reason, cases, **record.stages)
+    return Campaign(
+        tuple(study.factors),
+        target,
+        study.campaign,
+        outcome,
+        reason,
+        cases,
+        **record.stages,
+        direct=study.direct,
+    )
 
 
 class _Record:

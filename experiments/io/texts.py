@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import difflib
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from experiments.io.errors import InputError
@@ -113,3 +114,9 @@ def nearest_name(name: str, known: list[str]) -> str:
     """Suggest the known name nearest to a misspelt one, as the end of a sentence."""
     near = difflib.get_close_matches(name, known, n=1)
     return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known) or 'none'}"
+
+
+def enumeration(names: Iterable[str], joined: str = "and") -> str:
+    """Write names as "B", "B and E" or "B, E and F"; nothing for none."""
+    *first, last = [*names] or [""]
+    return f"{', '.join(first)} {joined} {last}" if first else last

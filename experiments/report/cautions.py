@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from experiments.calibrate.direct_checks import disagreement_text
 from experiments.calibrate.results import Campaign
 from experiments.measurement.filling import filling_missed, filling_reached, filling_text
 from experiments.report.kit.numbers import capital, enumeration, fixed
@@ -104,6 +105,12 @@ def _open_region(campaign: Campaign, study: Study) -> Iterator[Caution]:
         yield Caution(say("caution.wide_region", share=share, what=what, names=names, cure=cure), "optimum")
 
 
+def _disagreement(campaign: Campaign, study: Study) -> Iterator[Caution]:
+    for check in campaign.optimum.direct if campaign.optimum else ():
+        if check.apart:
+            yield Caution(say("caution.disagreement", text=capital(disagreement_text(check))), "optimum")
+
+
 def _poor_surface(campaign: Campaign, study: Study) -> Iterator[Caution]:
     if campaign.surface is None:
         return
@@ -131,6 +138,9 @@ def _thin_target(campaign: Campaign, study: Study) -> Iterator[Caution]:
     for name, sample in (campaign.target.responses if campaign.target else {}).items():
         if sample.n < FEW_MEASUREMENTS:
             yield Caution(say("caution.thin_target", name=name, few=FEW_MEASUREMENTS), "target")
+    for direct in campaign.direct:
+        if direct.measured.df < FEW_MEASUREMENTS - 1:
+            yield Caution(say("caution.thin_target", name=direct.title, few=FEW_MEASUREMENTS), "target")
 
 
 def _wide_margin(campaign: Campaign, study: Study) -> Iterator[Caution]:
@@ -153,6 +163,7 @@ _RULES: tuple[Callable[[Campaign, Study], Iterator[Caution]], ...] = (
     _heaps,
     _filling,
     _open_region,
+    _disagreement,
     _poor_surface,
     lambda campaign, study: _softened(study),
     _wide_margin,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from doe import JointFit
 from doe.plots.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, SKY
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
-from experiments.report.kit.chart import Chart, add_bars, new_figure
+from experiments.report.kit.chart import Chart, add_bars, add_line, new_figure
 from experiments.report.surface_charts import (
     REGION_FILL,
     Slice,
@@ -17,7 +17,7 @@ from experiments.report.surface_charts import (
     add_region,
     add_settings,
 )
-from experiments.studyfile.campaign import Response
+from experiments.studyfile.campaign import Direct, Response
 
 COLORS = (BLUE, ORANGE, PURPLE, SKY, MUTED)
 """Colours of the responses, in order."""
@@ -60,17 +60,28 @@ def _plane_chart(
     fits = [(one, surface.responses[one.name].reduced) for one in responses if not one.held_out]
     plane = Slice(fits[0][1], x, y, optimum.point, fits[0][0])
     figure = new_figure(surface.design.factor(x).label, surface.design.factor(y).label)
-    for (response, fit), color in zip(fits, itertools.cycle(COLORS)):
+    colors = itertools.cycle(COLORS)
+    for (response, fit), color in zip(fits, colors, strict=False):
         name = response.name
         level = joint.goals[name].target.mean
         add_region(figure, plane, joint.band(name), f"{name} agrees", _translucent(color))
         grid = Slice(fit, x, y, optimum.point, response).grid()
         add_level(figure, grid, f"{name} at its target", level, color, 2)
+    for direct, color in zip(_readings(optimum, (x, y)), colors, strict=False):
+        add_region(figure, plane, joint.band(direct.name), f"{direct.name} agrees", _translucent(color))
+        along, at = joint.region().axis(y if direct.factor == x else x)[[0, -1]], [direct.measured.mean] * 2
+        across, up = (at, along) if direct.factor == x else (along, at)
+        add_line(figure, across, up, f"{direct.name} as measured", color, hoverinfo="skip")
     add_region(figure, plane, joint.region(), "all agree", REGION_FILL.replace("0.28", "0.75"))
     add_design(figure, plane, surface.design)
     add_settings(figure, plane, target.truth, optimum.point, "chosen")
     caption = "Where each response agrees with its target, and where all do (green)."
     return Chart(f"joint-{x}-{y}", caption + plane.held_text, figure, height="tall")
+
+
+def _readings(optimum: OptimumResult, factors: tuple[str, str]) -> list[Direct]:
+    """List the direct readings of the factors of a plane."""
+    return [check.direct for check in optimum.direct if check.direct.factor in factors]
 
 
 def _translucent(color: str) -> str:

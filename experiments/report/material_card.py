@@ -15,7 +15,7 @@ from experiments.io.plug_ins import plug_in_versions
 from experiments.io.toml_files import toml_text
 from experiments.report.clump_files import gather_clumps
 from experiments.studyfile import Study
-from experiments.studyfile.campaign import Response
+from experiments.studyfile.campaign import Direct, Response
 from experiments.studyfile.card import MATERIAL, SECTIONS
 from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
@@ -81,6 +81,8 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
         "numerics": numerics.model_dump(exclude_none=True),
         "response": {response.name: _response(campaign, response) for response in campaign.responses},
     }
+    if campaign.direct:
+        facts["direct"] = {direct.name: _direct(direct) for direct in campaign.direct}
     if study.engine is not None:
         facts["engine"] = study.engine.name or study.engine.command
     if added := plug_in_versions():
@@ -104,6 +106,11 @@ def _response(campaign: Campaign, response: Response) -> dict[str, Any]:
         difference = {"difference": quantity_text(test.difference, unit), "interval": interval}
         facts["fresh"] = sample_table(test.a, unit) | difference
     return facts
+
+
+def _direct(direct: Direct) -> dict[str, Any]:
+    facts = {"factor": direct.factor, "by": direct.by, **sample_table(direct.measured, direct.unit)}
+    return facts | {"model_sd": quantity_text(direct.model_sd, direct.unit)}
 
 
 def sample_table(sample: Sample, unit: str) -> dict[str, Any]:

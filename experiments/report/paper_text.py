@@ -19,7 +19,7 @@ from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Layout, Table, columns, make_table
 from experiments.report.study_facts import study_facts
 from experiments.studyfile import Study
-from experiments.studyfile.campaign import Response
+from experiments.studyfile.campaign import Direct, Response
 
 
 @dataclass(frozen=True)
@@ -146,6 +146,13 @@ def _choice(campaign: Campaign, study: Study) -> Iterator[str]:
     share = fixed(100.0 * optimum.region.fraction, 0)
     level = fixed(100.0 * campaign.settings.optimum.confidence, 0)
     yield say("methods.target", aims=aims)
+    readings = [
+        f"the {study.labels[one.factor]} by {one.by.replace('-', ' ')}, {_sample(one.measured, one)}"
+        for one in campaign.direct
+        if one.factor in optimum.point
+    ]
+    if readings:
+        yield say("methods.direct", readings=enumeration(readings))
     yield say("methods.choice", values=values, share=share, level=level)
 
 
@@ -172,7 +179,7 @@ def _units(text: str) -> str:
     return text.replace("^2", "²").replace("^3", "³")
 
 
-def _sample(sample: Any, response: Response) -> str:
+def _sample(sample: Any, response: Response | Direct) -> str:
     mean, sd = quantity(sample.mean, response.unit), quantity(sample.sd, response.unit)
     return say("methods.sample", mean=mean, sd=sd, n=sample.n)
 

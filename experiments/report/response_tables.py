@@ -14,12 +14,16 @@ from experiments.calibrate.results import Campaign, ScreeningResult, SurfaceResu
 from experiments.report.kit.numbers import term, unit_sign
 from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
-from experiments.studyfile.campaign import TARGET_SCENE, OptimumSettings, Response
+from experiments.studyfile.campaign import TARGET_SCENE, Direct, OptimumSettings, Response
+
+DIRECT = ""
+"""Scene of direct readings, which costs nothing."""
 
 
 def goals_table(campaign: Campaign) -> Table:
     """Lay out every response: its target, and as far as they are known noise, fit and fresh cases."""
     rows = {response.name: _goal(campaign, response) for response in campaign.responses}
+    rows |= {direct.name: _direct_goal(campaign, direct) for direct in campaign.direct}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
     optimum = campaign.optimum
     marks: list[str] | None = None
@@ -35,6 +39,7 @@ def goals_table(campaign: Campaign) -> Table:
         *columns(
             "free",
             target_se="se",
+            **({"model_sd": "sd of the model"} if campaign.direct else {}),
             noise="sd of one case",
             reduced="fit there, reduced model",
             fitted="full model",
@@ -45,6 +50,8 @@ def goals_table(campaign: Campaign) -> Table:
         Column("fresh_p", "p, no difference", "p"),
     ]
     note = "Scene: the study's own, or a further one by its name. The first response leads the climb."
+    if campaign.direct:
+        note += " " + say("note.direct")
     if "t" in table:
         note += (
             " There: at the chosen point. Errors off and p: the full model's fit less the target, over the "
@@ -72,6 +79,15 @@ def _goal(campaign: Campaign, response: Response) -> dict[str, Any]:
     return facts
 
 
+def _direct_goal(campaign: Campaign, direct: Direct) -> dict[str, Any]:
+    sample, optimum = direct.measured, campaign.optimum
+    facts: dict[str, Any] = {"scene": f"direct, {direct.by}", "unit": unit_sign(direct.unit)}
+    facts |= {"target": sample.mean, "sd": sample.sd, "n": sample.n, "target_se": sample.se}
+    if optimum is not None:
+        facts["reduced"] = optimum.settings[direct.factor]
+    return facts | {"model_sd": direct.model_sd}
+
+
 def response_tables(campaign: Campaign) -> dict[str, Table]:
     """Lay out what several responses buy together; empty where there is one, or none was fitted."""
     screening, surface = campaign.screening, campaign.surface
@@ -94,9 +110,9 @@ def _shrinkage_table(campaign: Campaign, joint: JointFit) -> Table:
         table[column] *= 100.0
     costs = campaign.scene_costs
     costs["work"] = 100.0 * costs["grain_time"] / costs["grain_time"].sum()
-    paid: set[str] = set()
+    paid = {DIRECT}
     for name in table.index:
-        scene = scenes[str(name)]
+        scene = scenes.get(str(name), DIRECT)
         for column in ("cases", "simulated_time", "work"):
             table.loc[name, column] = 0.0 if scene in paid else costs.loc[scene, column]
         paid.add(scene)

@@ -79,6 +79,17 @@ def target_table(campaign: Campaign) -> Table:
         for response in campaign.responses
         if response.name in samples
     ]
+    rows += [
+        {
+            "response": direct.name,
+            "scene": f"direct, {direct.by}",
+            "unit": unit_sign(direct.unit),
+            "role": "fitted",
+            "target_se": direct.measured.se,
+        }
+        | vars(direct.measured)
+        for direct in campaign.direct
+    ]
     heads = columns("free", mean="mean", sd="standard deviation")
     shown: Layout = ["response", "scene", "role", "unit", *heads, "n"]
     shown.append(Column("target_se", "standard error", "free"))

@@ -225,6 +225,29 @@ class Response:
 
 
 @dataclass(frozen=True)
+class Direct:
+    """A measurement of a factor itself: a response whose surface is the factor, without cases."""
+
+    name: str
+    """Name, other than that of every response."""
+    factor: str
+    """Factor that it is of."""
+    by: str
+    """Method, e.g. ``incline``."""
+    unit: str
+    """Natural unit of the factor; ``"1"``: a plain number."""
+    measured: Sample
+    """Measurements of the factor, in that unit."""
+    model_sd: float
+    """Standard deviation by which the model's parameter may differ from that of the real surface."""
+
+    @property
+    def title(self) -> str:
+        """Method and factor in words."""
+        return f"{self.by} of {self.factor}"
+
+
+@dataclass(frozen=True)
 class Twin:
     """Hidden settings that the target is simulated with; the campaign does not see them."""
 

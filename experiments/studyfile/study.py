@@ -19,9 +19,10 @@ from dem_warp import Case
 from doe import Factor
 from experiments.io.errors import StudyError
 from experiments.io.texts import nearest_name
-from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
+from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Direct, Target
 from experiments.studyfile.cluster_section import ClusterSection
 from experiments.studyfile.conditions import BASE, Condition, Conditions, free_of
+from experiments.studyfile.direct_section import DirectSection, build_direct
 from experiments.studyfile.engine_section import EngineSection
 from experiments.studyfile.factor_section import (
     FactorSection,
@@ -92,6 +93,8 @@ class Study(Physics):
     """The angle to be matched."""
     response_sections: tuple[ResponseSection, ...] = Field(default=(), alias="response")
     """Further numbers to be matched."""
+    direct_sections: tuple[DirectSection, ...] = Field(default=(), alias="direct")
+    """Factors that were measured by themselves."""
     response_scenes: dict[str, Scene] = Field(default_factory=dict, alias="response-scene")
     """Further scenes, by the names that responses call them by."""
     factor_sections: tuple[FactorSection, ...] = Field(default=(), alias="factor")
@@ -132,7 +135,10 @@ class Study(Physics):
         """All of the study that its results depend on, its clumps included, as JSON-able data."""
         digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in self.grain.files]
         document = {key: value for key, value in self.document.items() if key != "cluster"}
-        return {"study": document, "scale": self.scale, "clump_sha256": digests}
+        tables = [section.file for section in self.direct_sections if section.file is not None]
+        direct = [hashlib.sha256(table.read_bytes()).hexdigest() for table in tables]
+        known = {"study": document, "scale": self.scale, "clump_sha256": digests}
+        return known | ({"direct_sha256": direct} if direct else {})
 
     @cached_property
     def sha256(self) -> str:
@@ -152,6 +158,16 @@ class Study(Physics):
         if self._target is None:
             raise StudyError(str(self.file), "needs a [target] or a [[response]] to be calibrated")
         return self._target
+
+    @cached_property
+    def direct(self) -> tuple[Direct, ...]:
+        """Direct readings of factors, in the order of the file."""
+        return build_direct(self.direct_sections, self.factor_sections, self._titles, self._places)
+
+    @property
+    def _titles(self) -> list[str]:
+        """Names of the responses as written."""
+        return [section.title for section in (self.target_section, *self.response_sections) if section]
 
     @cached_property
     def scenes(self) -> dict[str, SceneSection]:
@@ -299,7 +315,7 @@ class Study(Physics):
     def _check_names(self) -> None:
         """Refuse factors named like a column of the results' tables."""
         names = [section.name for section in self.factor_sections]
-        titles = [section.title for section in (self.target_section, *self.response_sections) if section]
+        titles = [*self._titles, *(direct.name for direct in self.direct)]
         check_factor_names(names, self._places, self.scenes.values(), titles)
 
     def match(self) -> None:

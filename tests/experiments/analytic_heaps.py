@@ -9,7 +9,7 @@ import pandas as pd
 
 from doe import Factor
 from experiments.studyfile import Study
-from experiments.studyfile.campaign import CampaignSettings, Target
+from experiments.studyfile.campaign import CampaignSettings, Direct, Target
 
 Angle = Callable[[Mapping[str, float]], float]
 Runner = Callable[[pd.DataFrame], pd.DataFrame]
@@ -80,6 +80,7 @@ class StandInStudy:
     least: float = 0.0
     """Physical limit of every factor."""
     file: Path = Path("study.toml")
+    direct: tuple[Direct, ...] = ()
 
     @property
     def labels(self) -> dict[str, str]:

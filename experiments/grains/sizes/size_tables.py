@@ -42,7 +42,7 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
     are sieves of ASTM E11. ``unit`` is that of openings without one. Return the distribution by mass between
     the finest and the coarsest opening, and the part of the mass beyond them.
     """
-    header = _Header(_sieve_column)
+    header = UnitHeader(_sieve_column)
     found = list(read_rows(path, ("opening",), SIEVE_COLUMNS, header))
     column = _one_of(path, found, SIEVE_COLUMNS[1:])
     _at_least(path, found, 2)
@@ -73,7 +73,7 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
 
 
 @dataclass
-class _Header:
+class UnitHeader:
     """Names of a sheet's columns as this module has them, and the units in their brackets."""
 
     column: Callable[[str, str], str]
@@ -132,7 +132,7 @@ def read_counts(path: Path, unit: str | None = None, column: str | None = None) 
             return "diameter" if name.lower() == _UNIT.sub("", column).strip().lower() else ""
         return name.lower() if name.lower() in COUNT_COLUMNS else name
 
-    header = _Header(named)
+    header = UnitHeader(named)
     needed = ("diameter",) if column is not None else ()
     rows = list(read_rows(path, needed, COUNT_COLUMNS, header))
     unit = next(iter(header.units.values()), None) or unit

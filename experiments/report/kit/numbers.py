@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup, escape
 
+from experiments.io.texts import enumeration as enumeration
 from experiments.studyfile.campaign import Response
 
 MISSING = "–"
@@ -179,12 +180,6 @@ def named_number(value: Any, name: str) -> str:
 def prose(text: str) -> str:
     """Typeset a sentence of a campaign: degree signs and true minus signs."""
     return re.sub(r"(?<![\w.])-(?=\d)", "−", re.sub(r" deg\b", "°", text))
-
-
-def enumeration(names: Iterable[str], joined: str = "and") -> str:
-    """Write names as "B", "B and E" or "B, E and F"; nothing for none."""
-    *first, last = [*names] or [""]
-    return f"{', '.join(first)} {joined} {last}" if first else last
 
 
 def capital(text: str) -> str:

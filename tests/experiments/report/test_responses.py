@@ -75,3 +75,48 @@ def test_the_card_names_every_response(found: Campaign, point: Study, tmp_path: 
         target.mean,
         rel=5e-4,  # four digits
     )
+
+
+@pytest.fixture(scope="module")
+def measured_alone() -> Study:
+    """Add a reading of E that is far off, and one of F, which is not kept."""
+    rows = [
+        {"parameter": "E", "by": "sledge", "mean": 40, "sd": 2, "n": 10, "model_sd": 0.01},
+        {"parameter": "F", "by": "value", "mean": 0.3, "sd": 0.02, "n": 1},
+    ]
+    return study_with(load_study(POINT, "bench", {"direct": rows}), selection={"keep": ("E", "G")})
+
+
+@pytest.fixture(scope="module")
+def read_directly(measured_alone: Study) -> Campaign:
+    return calibrate(measured_alone, lambda table: planes(measured_alone, table))
+
+
+def test_direct_readings_are_rows_next_to_the_responses(
+    read_directly: Campaign, measured_alone: Study
+) -> None:
+    shown = Page(render_page(read_directly, measured_alone))
+    assert shown.mismatches == []
+    for table in ("target", "responses"):
+        assert [row[0][0] for row in shown.rows(table)][-2:] == ["E_sledge", "F_value"]
+    rows = {row[0][0]: row for row in shown.rows("shrinkage")}
+    assert set(rows) == {"angle", "density", "flow", "E_sledge"}  # F was not kept
+    cost = dict(zip((row[0][0] for row in shown.rows("shrinkage")), shown.values("shrinkage"), strict=True))
+    assert cost["E_sledge"][4:].tolist() == [0.0, 0.0, 0.0]
+    check = read_directly.optimum.direct[0]
+    assert check.apart
+    # among the cautions before the values, and in the decisions
+    words = f"density and flow disagree with the sledge of E by {check.errors:.1f} standard errors"
+    assert shown.text.count(words) >= 2
+    assert "E by sledge" in shown.text or "friction by sledge" in shown.text
+
+
+def test_the_card_names_the_direct_readings(
+    read_directly: Campaign, measured_alone: Study, tmp_path: Path
+) -> None:
+    path = write_material_card(read_directly, measured_alone, tmp_path)
+    direct = tomllib.loads(path.read_text(encoding="utf-8"))["fitted"]["direct"]
+    assert direct["F_value"] == {
+        "factor": "F", "by": "value", "mean": 0.3, "sd": 0.02, "n": 1, "model_sd": 0.015
+    }  # fmt: skip
+    assert direct["E_sledge"]["mean"] == pytest.approx(np.tan(np.radians(40.0)), rel=1e-3)
