@@ -34,7 +34,7 @@ def checked_result(case: Case, result: CaseResult, engine: Engine | None = None)
     Raise InputError for what is not a result.
     """
     if not isinstance(result, CaseResult):
-        problem = f"{outside(engine)} must hand on a dem_warp.CaseResult for each case"
+        problem = f"{outside(engine)} must hand on a dem_warp.CaseResult for each case".lstrip()
         raise InputError("engine", problem, result)
     finite = {name: value for name, value in result.observables.items() if _is_finite(value)}
     wrong = [f"{name} = {value}" for name, value in result.observables.items() if name not in finite]
