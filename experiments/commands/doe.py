@@ -111,7 +111,8 @@ def design(
         factors = [] if before else [read_factor(text) for text in factor or []]
         made = make_design(kind, factors, component or [], before, given)
         answer = describe_design(made, model, sd, effect)
-        answer.texts.append(answer.tables["runs"][1].to_csv().rstrip())
+        if out is None:
+            answer.texts.append(answer.tables["runs"][1].to_csv().rstrip())
     _show(answer, out, as_json, f"a {kind} design")
 
 
@@ -330,9 +331,9 @@ def _show(answer: Answer, out: Path | None, as_json: bool, source: str) -> None:
             publish(answer, out, source)
         if as_json:
             typer.echo(json.dumps(plain_answer(answer), allow_nan=False))
-        else:
+        elif answer.texts:
             typer.echo(plain("\n\n".join(answer.texts)))
-            for note in answer.notes:
-                messages.print(f"Note: {note}")
+        for note in [] if as_json else answer.notes:
+            messages.print(f"Note: {note}")
         if out:
             messages.print(f"Wrote {out / 'report.html'}, tables and plots.")
