@@ -16,7 +16,7 @@ import numpy as np
 from doe.discrepancy.contest.fresh_runs import FreshRuns, Request
 from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, Question, find_gap
 from doe.discrepancy.contest.held_out import held_out_gain
-from doe.discrepancy.contest.power import Effects, Power, powers, shown_apart
+from doe.discrepancy.contest.power import Effects, powers, shown_apart
 from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
 from doe.discrepancy.contest.rounds import CandidateModel, CandidateModels, simulate_again
 from doe.discrepancy.contest.signatures import Signatures, signatures
@@ -71,7 +71,6 @@ class _Base:
     gap: GapTest
     seen: Signatures
     effects: Effects
-    power: tuple[Power, ...]
 
 
 def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: int) -> Analysis:
@@ -248,13 +247,10 @@ class _Parts:
         return simulate_again(candidates, self.fresh, self.settings, error, rivalry)
 
     def base(self, fitted: Fitted) -> _Base:
-        """Collect the gap, signatures and power of the calibrated base."""
+        """Collect the gap, signatures and possible effects of the calibrated base."""
         seen = signatures(fitted)
         gap = self._gap(fitted, self.settings.false_alarm, OF_THE_BASE)
-        effects = Effects.of(fitted, seen)
-        return _Base(
-            fitted, gap, seen, effects, powers(effects, seen.shares, self.emulator.space, self.settings)
-        )
+        return _Base(fitted, gap, seen, Effects.of(fitted, seen))
 
     def whole(self, fitted: Fitted) -> Fitted:
         """Weigh a fit on all conditions, those of the fit and those of the forecast."""
@@ -320,7 +316,7 @@ class _Parts:
                 records.candidate_record(one, base.seen, base.gap.scores, self.settings)
                 for one in assessments
             ),
-            power=base.power,
+            power=powers(base.effects, base.seen.shares, self.emulator.space, self.settings),
             confounding=Confounding(base.seen.names, base.seen.correlations),
             before_after=tuple(before_after),
             next_experiment=self._next(base, conclusion, assessments),

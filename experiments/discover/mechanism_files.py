@@ -150,7 +150,7 @@ def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float])
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
     kept = {"title", "sentence", "kind", "parameters", "unit", "source", "confirm", "directed", "saturation"}
     shared = file.model_dump(include=kept)
-    return MechanismFactor(name, **shared, null=null, maximum=maximum, companions=companions)
+    return MechanismFactor(name, null, maximum, **shared, companions=companions)
 
 
 def _read(path: Path) -> MechanismFile:

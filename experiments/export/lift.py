@@ -21,9 +21,6 @@ FIRST_SEED = 10_000
 RAIN_DENSITY = 0.12
 """Largest solid fraction of the rain: in a denser one not all grains find a place at random."""
 
-RAIN_HEIGHT = 3.0
-"""Height of the space of the rain [diameters of the largest grain]."""
-
 SIDES = 60
 """Sides of the prism around the tube; its edges are 0.14 % of the radius outside the cylinder."""
 
@@ -156,8 +153,8 @@ class Lift:
 
     @property
     def rain_height(self) -> float:
-        """Height of the space that grains are put in [m]."""
-        return RAIN_HEIGHT * 2.0 * self.reach
+        """Height of the space that grains are put in, three diameters of the largest [m]."""
+        return 6.0 * self.reach
 
     @property
     def rain_period(self) -> float:

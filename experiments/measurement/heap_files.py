@@ -19,7 +19,7 @@ from experiments.studyfile.study import MeasurementSection
 from imaging import Doubt, HeapAngle, PictureError, ReposeAngle, heap_angle, overlay, snapshot
 from imaging.drawing.ground import REST, find_ground, height_is_along_y
 from imaging.geometry import Picture, Spheres
-from imaging.photo.doubts import GREATEST_ANGLE, LEAST_ANGLE, ROUGH_EDGE
+from imaging.photo.doubts import ROUGH_EDGE, doubts_of_mean
 
 SIDES = ("left", "right")
 DEFAULT_UNIT = "m"
@@ -152,7 +152,8 @@ def _span(radii: np.ndarray) -> str:
 def values_of(heap: MeasuredHeap, level: float) -> dict[str, Any]:
     """Return the values of a heap's row, without those of a camera; flanks are means over its views."""
     left, right = (float(np.mean([getattr(view, side) for view in heap.angle.views])) for side in SIDES)
-    values = mean_values(heap.angle, left, right, level, (*heap.doubts, *_doubts(heap.angle)))
+    doubts = doubts_of_mean(heap.angle.mean, heap.angle.se, ROUGH_EDGE)
+    values = mean_values(heap.angle, left, right, level, (*heap.doubts, *doubts))
     return values | {"source": heap.source}
 
 
@@ -163,10 +164,3 @@ def mean_values(
     low, high = angle.interval(level)
     values = {"left": left, "right": right, "mean": angle.mean, "se": angle.se, "low": low, "high": high}
     return values | {"doubts": [str(doubt) for doubt in doubts]}
-
-
-def _doubts(angle: HeapAngle) -> Iterator[Doubt]:
-    if not LEAST_ANGLE <= angle.mean <= GREATEST_ANGLE:
-        yield Doubt("range", f"{angle.mean:.1f} degrees, outside {LEAST_ANGLE:g} to {GREATEST_ANGLE:g}")
-    if angle.se > ROUGH_EDGE:
-        yield Doubt("error", f"a standard error of {angle.se:.2f} degrees, over {ROUGH_EDGE:g}")

@@ -6,16 +6,18 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from doe.discrepancy import MechanismRange
 from experiments.io.units import Quantity
 from experiments.studyfile.study import Study
 
 
-@dataclass(frozen=True)
-class MechanismFactor:
-    """A physical effect that a study may lack, as a factor with a null."""
+@dataclass(frozen=True, kw_only=True)
+class MechanismFactor(MechanismRange):
+    """A physical effect that a study may lack, as a factor with a null.
 
-    name: str
-    """Name in every table, and of the factor."""
+    Its name is that in every table, and of the factor; if it has a direction, the study has it along x.
+    """
+
     title: str
     sentence: str
     """Its name in physics, and an explanation in plain language."""
@@ -25,16 +27,9 @@ class MechanismFactor:
     """Place, or places of one value, in the study."""
     unit: str
     """Unit of the sizes, ``1`` for a plain number."""
-    null: float
-    maximum: float
-    """Size that the study has without it, and the largest that is searched."""
     source: str
     confirm: str
     """Source of law and range, and the further experiment that would show it."""
-    directed: bool = False
-    """It has a direction, which the study has along x."""
-    saturation: float | None = None
-    """Distance from the null over which the effect of one more step falls to 1/e; None: it stays."""
     companions: tuple[tuple[str, float | str], ...] = ()
     """Further settings that it needs in the study, by place."""
 

@@ -21,8 +21,6 @@ LARGEST_UNSEEN_TILT = 5.0
 """Tilt without a visible plate [degrees]: hands hold a phone level within 3 or 4."""
 LARGEST_TILT = 12.0
 """Tilt with a visible plate [degrees]."""
-LEAST_ANGLE, GREATEST_ANGLE = 5.0, 60.0
-"""Range of repose angles of dry grains [degrees]."""
 LARGEST_ELEVATION = 12.0
 """Angle at which the camera looks down [degrees] whose effect is corrected (2.3 degrees on a heap of 20)."""
 LARGEST_MISFIT = 0.06
@@ -54,6 +52,14 @@ LARGEST_SHIFT = 1.0
 """Change of the mean with the threshold [degrees]: that of an edge is small, that of a shadow is not."""
 
 
+def doubts_of_mean(mean: float, se: float, largest_error: float) -> Iterator[Doubt]:
+    """Doubt a large standard error, and an angle that dry grains do not have."""
+    if se > largest_error:
+        yield Doubt("error", f"a standard error of {se:.2f} degrees, over {largest_error:g}")
+    if not 5.0 <= mean <= 60.0:
+        yield Doubt("range", f"{mean:.1f} degrees, outside 5 to 60")
+
+
 def doubts_of(
     left: FlankLine,
     right: FlankLine,
@@ -66,10 +72,7 @@ def doubts_of(
     lean = abs(left.angle - right.angle)
     if lean > LARGEST_LEAN:
         yield Doubt("lean", f"left and right are {lean:.1f} degrees apart, over {LARGEST_LEAN:g}")
-    if se > largest_error:
-        yield Doubt("error", f"a standard error of {se:.2f} degrees, over {largest_error:g}")
-    if not LEAST_ANGLE <= mean <= GREATEST_ANGLE:
-        yield Doubt("range", f"{mean:.1f} degrees, outside {LEAST_ANGLE:g} to {GREATEST_ANGLE:g}")
+    yield from doubts_of_mean(mean, se, largest_error)
     if abs(outline.plate.tilt) > LARGEST_TILT:
         yield Doubt("tilt", f"{outline.plate.tilt:.1f} degrees, over {LARGEST_TILT:g}")
     if outline.elevation > LARGEST_ELEVATION:

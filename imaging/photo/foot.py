@@ -39,21 +39,13 @@ LEAST_ARC = 3.0
 """Least depth of a visible foot, in its standard errors and in pixels."""
 
 
-@dataclass(frozen=True)
-class PlateTop:
-    """Picture below the plate's line."""
-
-    level: Layer
-    """Difference from the plate's own colours over the threshold for the heap; 0 above the line, shape (rows,
-    columns)."""
-    alike: bool
-    """True where heap and plate are too similar to find the heap's end."""
-
-
 def below_plate(
     colors: Layer, heap: NDArray[np.bool_], body: NDArray[np.bool_], plate: PlateLine
-) -> PlateTop:
+) -> Layer | None:
     """Compare what is below the plate's line with the plate.
+
+    The difference from the plate's own colours is over the threshold for the heap, 0 above the line, shape
+    (rows, columns); None where heap and plate are too similar to find the heap's end.
 
     The plate's own colour along each levelled row is interpolated between its two ends, which removes its
     top, its front and the light on them; the heap remains, or its shadow. `heap` is the part of it above the
@@ -66,7 +58,7 @@ def below_plate(
     flat = np.asarray(turned, dtype=np.float32).reshape(colors.shape)
     first = int(np.ceil(plate.row)) + 1
     if first >= rows - 2:
-        return PlateTop(nothing, alike=False)
+        return nothing
     ends = np.flatnonzero(body.any(axis=0))[[0, -1]]
     size = max(2, round(SIDE_SHARE * (ends[1] - ends[0])))
     sides = [flat[first:, ends[0] : ends[0] + size], flat[first:, ends[1] - size + 1 : ends[1] + 1]]
@@ -78,11 +70,11 @@ def below_plate(
     own = middles[0][:, None] + share[None, :, None] * (middles[1] - middles[0])[:, None]
     least = max(LIKENESS * noise, LEAST_DIFFERENCE)
     difference, typical = _difference_from_plate(flat[first:], own, colors, heap, least)
-    upper = nothing.copy()
-    upper[first:] = difference / max(0.5 * typical, least)
+    if typical < least:
+        return None
+    nothing[first:] = difference / max(0.5 * typical, least)
     back = np.array([[1.0, 0.0, 0.0], [plate.slope, 1.0, 0.0]])
-    level = np.asarray(cv2.warpAffine(upper, back, (columns, rows)), dtype=np.float32)
-    return PlateTop(level, alike=typical < least)
+    return np.asarray(cv2.warpAffine(nothing, back, (columns, rows)), dtype=np.float32)
 
 
 def _difference_from_plate(

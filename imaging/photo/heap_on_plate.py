@@ -197,14 +197,14 @@ def _on_seen_plate(
     top = below_plate(seen.colors, heap, body, plate)
     level = np.asarray(seen.values / threshold, dtype=np.float32)
     level_view = FoundHeap(top_edge(heap, level, 1.0), plate, 0.0, 0.0, ())
-    if top.alike:
+    if top is None:
         return replace(level_view, doubts=(UNSEEN_FOOT,))
-    whole = joined_foot(heap, top.level, plate)
+    whole = joined_foot(heap, top, plate)
     if whole[:, 0].any() or whole[:, -1].any():
         doubt = Doubt("plate", "the plate differs from its own ends: the heap's foot is not visible")
         return replace(level_view, doubts=(doubt,))
     line = plate.rows_at(np.arange(heap.shape[1]))
-    combined = np.where(np.arange(heap.shape[0])[:, None] <= line, level, top.level)
+    combined = np.where(np.arange(heap.shape[0])[:, None] <= line, level, top)
     base = front_of_base(bottom_edge(whole, combined, 1.0), plate.slope)
     if base.row + base.depth - plate.row < LEAST_FOOT:
         return level_view

@@ -44,7 +44,6 @@ from imaging.photo.view_settings import View
 from imaging.photo.wall_shadow import (
     MOST_SHADED,
     WIDELY_SHADED,
-    ShadedEdge,
     shaded_edge,
     without_sharp_shadows,
 )
@@ -159,9 +158,9 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
     if best.crooked > NO_HEAP:
         finding = f"an outline that deviates from two lines by {best.crooked:.2f} of its height"
         raise PictureError(place, "no heap: two straight flanks must meet at its tip", finding)
-    shaded = shaded_edge(seen, best.heap.rows, best.heap.plate)
-    doubted = _doubt_of_shade(shaded, best, place)
-    if shaded.share > MOST_SHADED:
+    share, below = shaded_edge(seen, best.heap.rows, best.heap.plate)
+    doubted = _doubt_of_shade(share, below, best, place)
+    if share > MOST_SHADED:
         width = int(np.isfinite(best.heap.rows).sum())
         if lit := _without_sharp_shadow(seen, width, given, view, place):
             best, finding, doubted = lit, "", []
@@ -243,22 +242,21 @@ def _without_sharp_shadow(
         return None
     if firm.shift(candidates) > LARGEST_SHIFT:
         return None
-    shaded = shaded_edge(seen, firm.heap.rows, firm.heap.plate)
-    return firm if shaded.share <= MOST_SHADED else None
+    return firm if shaded_edge(seen, firm.heap.rows, firm.heap.plate)[0] <= MOST_SHADED else None
 
 
-def _doubt_of_shade(shaded: ShadedEdge, best: Candidate, place: str) -> list[Doubt]:
+def _doubt_of_shade(share: float, rows: FloatArray, best: Candidate, place: str) -> list[Doubt]:
     """Doubt the angle where bands of shaded wall along a flank are long, or change the angle.
 
     Gaps between grains may be as even as a shadow and of the wall's hue, but they are short and shallow and
     do not change the angle.
     """
-    if shaded.share <= MOST_SHADED:
+    if share <= MOST_SHADED:
         return []
-    finding = f"{shaded.share:.2f} of a flank's edge has darker wall below it, and no grains: a sharp shadow?"
-    if shaded.share <= WIDELY_SHADED:
+    finding = f"{share:.2f} of a flank's edge has darker wall below it, and no grains: a sharp shadow?"
+    if share <= WIDELY_SHADED:
         try:
-            below = _candidate(replace(best.heap, rows=shaded.rows), place)
+            below = _candidate(replace(best.heap, rows=rows), place)
         except PictureError:
             return [Doubt("shade", finding)]
         if best.like(below):

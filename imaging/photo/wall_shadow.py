@@ -6,7 +6,7 @@ inside it has the hue of the wall, and no grains.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -50,18 +50,11 @@ SPECK = 5
 """Width of removed specks [pixels]: the rim of a shadow is uneven."""
 
 
-@dataclass(frozen=True)
-class ShadedEdge:
-    """Bands of shaded wall below a heap's edge."""
-
-    share: float
-    """Share of the edge with such a band below it, on the flank that has more."""
-    rows: FloatArray
-    """The edge below these bands; NaN outside the heap, shape (columns,)."""
-
-
-def shaded_edge(seen: Contrast, rows: FloatArray, plate: PlateLine) -> ShadedEdge:
+def shaded_edge(seen: Contrast, rows: FloatArray, plate: PlateLine) -> tuple[float, FloatArray]:
     """Find bands of shaded wall below the upper edge of a heap, given as rows (NaN outside the heap).
+
+    The first is the share of the edge with such a band below it, on the flank that has more; the second the
+    edge below these bands, (columns,).
 
     A grey powder in front of a white wall is as even as its shadow; there only a different lightness counts.
     """
@@ -75,7 +68,7 @@ def shaded_edge(seen: Contrast, rows: FloatArray, plate: PlateLine) -> ShadedEdg
     middle = slice(max(tip - round(CORE * len(columns)), 0), tip + round(CORE * len(columns)) + 1)
     inner = ((row >= edge + 0.25 * height) & (row < ground - 0.1 * height))[:, middle]
     if not inner.any():
-        return ShadedEdge(0.0, rows)
+        return 0.0, rows
     alike = float(like[:, middle][inner].mean())
     within = float(np.median(dimming[:, middle][inner])) if alike > PARTLY else None
     first = np.ceil(edge) + EDGE
@@ -91,7 +84,7 @@ def shaded_edge(seen: Contrast, rows: FloatArray, plate: PlateLine) -> ShadedEdg
         if within is None or not 1.0 / SAME_LIGHT < light / within < SAME_LIGHT:
             share = max(share, float(deep[flank].mean()))
             lower[columns[flank]] = np.where(deep, first + depth, edge)[flank]
-    return ShadedEdge(share, lower)
+    return share, lower
 
 
 def without_sharp_shadows(seen: Contrast, width: int) -> Contrast:

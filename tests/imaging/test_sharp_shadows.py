@@ -86,10 +86,10 @@ def test_the_edge_below_a_shadow_is_the_heaps() -> None:
     )
     # Well under what the shadow differs by, .55 of the wall's 404.
     found, bare = (locate_heap(contrast, 60.0, None, View(), "drawn") for contrast in (seen, lit))
-    shaded = shaded_edge(seen, found.rows, found.plate)
-    assert shaded.share > MOST_SHADED
+    share, shaded = shaded_edge(seen, found.rows, found.plate)
+    assert share > MOST_SHADED
     tip = seen.values.shape[1] // 2
     middle = slice(tip, tip + round(0.4 * WIDTH))
     assert np.median((bare.rows - found.rows)[middle]) > 10.0
     # Two pixels are those of a blurred edge.
-    assert np.median(np.abs(bare.rows - shaded.rows)[middle]) < 2.5
+    assert np.median(np.abs(bare.rows - shaded)[middle]) < 2.5

@@ -7,7 +7,7 @@ terms lack, and the effect of a shift of the parameters in all observables and c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -90,22 +90,14 @@ class Misses:
     """Change of the emulated by a shift of each parameter, (parameters, n, observables)."""
     correlation: np.ndarray
     """Correlation of the noise, (observables, observables)."""
-    coefficients: np.ndarray
-    chance: np.ndarray
-    """Covariances of the emulator's errors, and their part due to noise, (observables, terms, terms)."""
-    misfit: np.ndarray
+    stated: Prior
+    """Knowledge without the runs, its smooth function the stated variance beyond all coefficients."""
     variance: np.ndarray
-    """Stated variance beyond all coefficients, and variance of one run, both where symmetry allows an effect,
-    (observables,)."""
-    factors: int
-    """Number of factors; the other parameters are sizes."""
+    """Variance of one run where symmetry allows an effect, (observables,)."""
 
     def prior(self, amplitude: float) -> Prior:
-        """Return the knowledge without the runs."""
-        # sizes are 0 to 1, factors -1 to 1
-        length = np.where(np.arange(self.x.shape[1]) < self.factors, LENGTH, LENGTH / 2.0)
-        smooth = self.misfit + amplitude * self.variance
-        return Prior(self.factors, self.coefficients, self.chance, smooth, length)
+        """Return the knowledge without the runs, with more of the smooth function."""
+        return replace(self.stated, amplitude=self.stated.amplitude + amplitude * self.variance)
 
     def log_likelihood(self, amplitude: float) -> float:
         """Return the log-likelihood of the misses."""
@@ -132,17 +124,22 @@ def misses(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray, cond
     missed = np.zeros((len(x), len(ratio)))
     np.add.at(missed, groups.reshape(-1), runs.values[here])
     variance = np.diag(surfaces.noise_covariance(centre, model.mechanisms)) * ratio
+    stated = Prior(
+        factors,
+        surfaces.coefficient_errors(centre[:factors], model.mechanisms),
+        surfaces.coefficient_chance(centre[:factors], model.mechanisms),
+        surfaces.misfit_variance(centre, model.mechanisms),
+        # sizes are 0 to 1, factors -1 to 1
+        np.where(np.arange(x.shape[1]) < factors, LENGTH, LENGTH / 2.0),
+    )
     return Misses(
         x,
         missed / counts[:, None] - model.predict(x, condition),
         variance / counts[:, None],
         np.array([_slope(model, x, step, condition) for step in np.eye(x.shape[1])]),
         surfaces.correlation(centre, model.mechanisms),
-        surfaces.coefficient_errors(centre[:factors], model.mechanisms),
-        surfaces.coefficient_chance(centre[:factors], model.mechanisms),
-        surfaces.misfit_variance(centre, model.mechanisms),
+        stated,
         variance * surfaces.moved(model.mechanisms),
-        factors,
     )
 
 

@@ -2,8 +2,7 @@
 
 A room is a folder directly in a package, or a file there. An import between rooms is a pair of rooms.
 A floor is the longest chain of imports below a room. Like code is a run of six statements that are equal
-once names and values are erased, and that at most eight files share; a run of nothing but fields and the
-heads of classes is data.
+once names and values are erased, and that at most eight files share.
 """
 
 from __future__ import annotations
@@ -161,8 +160,7 @@ def like_code() -> set[tuple[str, str]]:
         statements = list(_statements(tree(name).body))
         for index in range(len(statements) - LIKE_STATEMENTS + 1):
             run = statements[index : index + LIKE_STATEMENTS]
-            if not all(shape.startswith(("AnnAssign", "ClassDef")) for shape, _ in run):
-                places[tuple(shape for shape, _ in run)].add((name, run[0][1]))
+            places[tuple(shape for shape, _ in run)].add((name, run[0][1]))
     pairs = set()
     for found in places.values():
         if len({name for name, _ in found}) <= LIKE_FILES:

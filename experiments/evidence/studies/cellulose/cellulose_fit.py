@@ -25,9 +25,6 @@ from experiments.studyfile import Study
 LEVEL = 0.9
 """Probability that bands and ranges hold."""
 
-OPEN = 0.5
-"""A factor stays open where its range is more than this part of what the design explored."""
-
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
@@ -43,7 +40,7 @@ class Calibration:
         return natural(self.study, self.free.best)
 
     def ranges(self, fit: CurveFit) -> pd.DataFrame:
-        """Compatible range of each factor, the part of the design that it takes, and if it stays open."""
+        """Compatible range of each factor, its part of the design, and if it stays open: more than half."""
         ends = np.quantile(fit.settings, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0)
         low, middle, high = (natural(self.study, end).iloc[0] for end in ends)
         part = (ends[2] - ends[0]) / 2.0
@@ -55,7 +52,7 @@ class Calibration:
                 "middle": middle.to_numpy(),
                 "high": high.to_numpy(),
                 "part of the design": part,
-                "open": np.where(part > OPEN, "yes", "no"),
+                "open": np.where(part > 0.5, "yes", "no"),
             }
         )
 

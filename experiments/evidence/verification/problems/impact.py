@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -18,26 +18,27 @@ HERTZ_DURATION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
 
 @dataclass(frozen=True)
 class Partner:
-    """The sphere that is hit, at rest before but for a spin about y [rad/s]."""
+    """A sphere with a spin about y [rad/s]; the one that is hit, at rest before but for that."""
 
     material: Material
     radius: float
-    spin: float = 0.0
+    spin: float = field(default=0.0, kw_only=True)
+
+    @property
+    def mass(self) -> float:
+        """Mass of the sphere [kg]."""
+        return self.material.density * 4.0 / 3.0 * math.pi * self.radius**3
 
 
 @dataclass(frozen=True)
-class Impact:
+class Impact(Partner):
     """A sphere that falls along -z on a plane, rigid or of the `plate`'s material, or on a `partner`.
 
-    Speeds [m/s] are relative to what is hit: `normal_speed` towards it, `tangential_speed` along x. `spin`
-    [rad/s] is about y.
+    Speeds [m/s] are relative to what is hit: `normal_speed` towards it, `tangential_speed` along x.
     """
 
-    material: Material
-    radius: float
     normal_speed: float
     tangential_speed: float = 0.0
-    spin: float = 0.0
     restitution: float = 1.0
     friction: float = 0.0
     clamp: bool = False
@@ -52,14 +53,9 @@ class Impact:
         return contact(self.material, hit, self.restitution, self.friction, 0.0, self.clamp, self.mechanisms)
 
     @property
-    def mass(self) -> float:
-        """Mass of the falling sphere [kg]."""
-        return _mass(self.material, self.radius)
-
-    @property
     def partner_mass(self) -> float:
         """Mass of what is hit [kg]; a plane's is infinite."""
-        return _mass(self.partner.material, self.partner.radius) if self.partner else math.inf
+        return self.partner.mass if self.partner else math.inf
 
     @property
     def effective_mass(self) -> float:
@@ -109,10 +105,6 @@ class Impact:
         return world(grains, ClumpShape.sphere(self.radius), self.law, time_step, walls=walls)
 
 
-def _mass(material: Material, radius: float) -> float:
-    return material.density * 4.0 / 3.0 * math.pi * radius**3
-
-
 @dataclass(frozen=True)
 class Course:
     """One impact as simulated, step by step."""
@@ -122,8 +114,9 @@ class Course:
     """[s]."""
     overlap: np.ndarray
     force: np.ndarray
-    separation: np.ndarray
-    """Overlap [m], normal force [N] between two states, and speed of separation [m/s]."""
+    """Overlap [m], and normal force between two states [N]."""
+    speed_after: float
+    """Last speed of separation [m/s]."""
     velocities: np.ndarray
     spins: np.ndarray
     """[m/s], [rad/s], shape (steps + 1, bodies, 3)."""
@@ -140,7 +133,7 @@ class Course:
     @property
     def restitution(self) -> float:
         """Speed after over speed before."""
-        return float(self.separation[-1] / self.impact.normal_speed)
+        return self.speed_after / self.impact.normal_speed
 
     @property
     def time(self) -> np.ndarray:
@@ -177,6 +170,6 @@ def simulate_impacts(
         separation = v[:, 0] - (v[:, 1] if impact.partner else 0.0)
         force = impact.effective_mass * np.diff(separation) / dt
         states = motion.velocities[:, k], motion.spins[:, k]
-        courses.append(Course(impact, dt, overlap, force, separation, *states))
+        courses.append(Course(impact, dt, overlap, force, float(separation[-1]), *states))
     each = len(phases)
     return [courses[i : i + each] for i in range(0, len(courses), each)]

@@ -94,8 +94,10 @@ def spinning_impact(device: str) -> Result:
     heavy = material(70e12, 0.33, 2700e3)
     tests = {
         "6: spinning sphere on a plane": [chung_ooi.spinning(s) for s in SPINS],
-        "7: equal spheres, opposite spins": [chung_ooi.spinning(s, Partner(alloy, 0.1, -s)) for s in SPINS],
-        "7: equal spheres, equal spins": [chung_ooi.spinning(s, Partner(alloy, 0.1, s)) for s in SPINS],
+        "7: equal spheres, opposite spins": [
+            chung_ooi.spinning(s, Partner(alloy, 0.1, spin=-s)) for s in SPINS
+        ],
+        "7: equal spheres, equal spins": [chung_ooi.spinning(s, Partner(alloy, 0.1, spin=s)) for s in SPINS],
         "8: larger sphere, a thousand times as stiff and dense": [
             chung_ooi.spinning(s, Partner(heavy, 0.5)) for s in SPINS
         ],
