@@ -28,9 +28,6 @@ CELLS_PER_FACTOR = 2_000
 NEAR_EDGE = 2
 """Cells from the edge of what was explored at which a region ends there: the edge is a staircase of cells."""
 
-EDGE_SHARE = 0.25
-"""Share of a range's last cells near that edge from which on it ends there; a straight band has less."""
-
 
 @dataclass(frozen=True, eq=False)
 class Region:
@@ -118,7 +115,8 @@ class Region:
             inside = inside.reshape(self.resolution, -1)
             layers = np.flatnonzero(inside.any(axis=1))[[0, -1]] if inside.any() else ()
             ends[factor.name] = [
-                bool(np.mean(~seen[layer + shift, inside[layer]]) >= EDGE_SHARE)
+                # of a straight band fewer of the last cells are near the edge
+                bool(np.mean(~seen[layer + shift, inside[layer]]) >= 0.25)
                 for layer, shift in zip(layers, (0, 2 * NEAR_EDGE), strict=False)
             ] or [False, False]
         return pd.DataFrame.from_dict(ends, orient="index", columns=["low", "high"]).rename_axis("factor")

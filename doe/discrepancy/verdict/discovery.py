@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
+from scipy import stats
 
-from doe.discrepancy.contest.gap import Answer
+from doe.discrepancy.contest.gap import Answer, holm
 from doe.discrepancy.contest.power import Power
 from doe.discrepancy.contest.slips import Slip
 from doe.discrepancy.fitting.model_fit import Interval
@@ -92,9 +94,7 @@ class Fit:
     """Means by the model, held-out conditions included, and their standard errors, (conditions, observables).
     """
     residuals: np.ndarray
-    adjusted_p: np.ndarray
-    """Measured less predicted over the standard deviation of that difference, and its p value after Holm,
-    (conditions, observables)."""
+    """Measured less predicted over the standard deviation of that difference, (conditions, observables)."""
     calibration: tuple[CalibrationUse, ...] = ()
     """Declared calibration errors, and the used part of each."""
     heading: float | None = None
@@ -104,6 +104,13 @@ class Fit:
     def excess(self) -> float:
         """Part of Q that the noise does not account for."""
         return max(self.q - self.degrees_of_freedom, 0.0)
+
+    @cached_property
+    def adjusted_p(self) -> np.ndarray:
+        """P values of the residuals after Holm, (conditions, observables)."""
+        found, seen = self.residuals.copy(), np.isfinite(self.residuals)
+        found[seen] = holm(2.0 * stats.norm.sf(np.abs(found[seen])))
+        return found
 
 
 @dataclass(frozen=True)
@@ -223,7 +230,7 @@ class Discovery:
         _check("data", self.data, shape, ("means", "standard_errors", "replicates"))
         for name, fit in (("base", self.base), ("chosen", self.chosen), ("closest", self.closest)):
             if fit is not None:
-                _check(name, fit, shape, ("predicted", "predicted_se", "residuals", "adjusted_p"))
+                _check(name, fit, shape, ("predicted", "predicted_se", "residuals"))
 
 
 def _check(name: str, tables: Data | Fit, shape: tuple[int, int], fields: tuple[str, ...]) -> None:

@@ -1,9 +1,8 @@
 """Records of a discovery in natural units, from the arrays of an analysis."""
 
 import numpy as np
-from scipy import stats
 
-from doe.discrepancy.contest.gap import GapTest, condition_fits, drift_p, holm
+from doe.discrepancy.contest.gap import GapTest, condition_fits, drift_p
 from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import Signatures, projector
 from doe.discrepancy.emulation.emulator import Emulator
@@ -47,7 +46,6 @@ def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
     at_bounds = (fitted.x < fitted.model.lower + AT_BOUND) | (fitted.x > fitted.model.upper - AT_BOUND)
     names = (*space.factors, *fitted.mechanisms)
     predicted, predicted_se = _predictions(fitted)
-    residuals, adjusted = _residual_map(fitted, evidence)
     return Fit(
         mechanisms=fitted.mechanisms,
         theta=tuple(float(value) for value in theta),
@@ -61,8 +59,7 @@ def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
         clearest=gap.clearest,
         predicted=predicted,
         predicted_se=predicted_se,
-        residuals=residuals,
-        adjusted_p=adjusted,
+        residuals=_residual_map(fitted, evidence),
         calibration=calibration_uses(fitted, evidence),
         heading=_heading(fitted),
     )
@@ -125,11 +122,10 @@ def _predictions(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
     return np.array(values), np.array(errors)
 
 
-def _residual_map(fitted: Fitted, evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
-    """Return residuals in standard deviations, (conditions, observables), and p values after Holm."""
+def _residual_map(fitted: Fitted, evidence: Evidence) -> np.ndarray:
+    """Return residuals in standard deviations, (conditions, observables)."""
     emulator = fitted.model.emulator
-    shape = (len(emulator.space.conditions), len(emulator.observables))
-    residuals, adjusted = np.full(shape, np.nan), np.full(shape, np.nan)
+    residuals = np.full((len(emulator.space.conditions), len(emulator.observables)), np.nan)
     # the variance of a training residual is the part that a refit leaves
     root = np.linalg.inv(fitted.whitening) @ projector(fitted.sensitivities)
     training = np.sqrt(np.maximum((root**2).sum(axis=1), 1e-12 * np.diag(fitted.covariance)))
@@ -140,13 +136,12 @@ def _residual_map(fitted: Fitted, evidence: Evidence) -> tuple[np.ndarray, np.nd
         raw.append((seen.measured - seen.predicted) / np.sqrt(np.diag(seen.covariance)))
         blocks.append(block)
     whole = np.concatenate(raw)
-    p_values = holm(2.0 * stats.norm.sf(np.abs(whole)))
     start = 0
     for block in blocks:
         row, end = emulator.space.conditions.index(block.condition), start + len(block.mean)
-        residuals[row, block.columns], adjusted[row, block.columns] = whole[start:end], p_values[start:end]
+        residuals[row, block.columns] = whole[start:end]
         start = end
-    return residuals, adjusted
+    return residuals
 
 
 def drift_records(base: Fitted) -> tuple[Drift, ...]:
