@@ -4,8 +4,20 @@ import numpy as np
 import pytest
 
 from experiments.evidence.accuracy.photographs.phone_camera import PhoneCamera
-from experiments.evidence.accuracy.photographs.rendering import sharp_shadow
-from experiments.evidence.accuracy.photographs.sampling import photograph, photograph_in_hard_light
+from experiments.evidence.accuracy.photographs.photographed_heaps import GrainHeap
+from experiments.evidence.accuracy.photographs.rendering import (
+    Lamp,
+    Phone,
+    Surroundings,
+    Top,
+    render,
+    sharp_shadow,
+)
+from experiments.evidence.accuracy.photographs.sampling import (
+    photograph,
+    photograph_in_hard_light,
+    true_angle,
+)
 from experiments.evidence.accuracy.photographs.without import picture_without_heap
 from imaging import measure
 
@@ -83,3 +95,16 @@ def test_a_dish_of_the_walls_hue_is_doubted() -> None:
     kind, picture = picture_without_heap(940094)
     assert kind == "dish"
     assert "shade" in [doubt.name for doubt in measure(picture).doubts]
+
+
+def test_a_base_that_a_small_picture_hides_is_doubted() -> None:
+    """A webcam 8 degrees up: the lowest grains are lost in the noise; 2.6 degrees too steep."""
+    heap = GrainHeap(angle=15.5, rounding=0.05, grain=0.045, jitter=0.14, strays=40)
+    camera = PhoneCamera(640, 480, distance=4.8, elevation=8.0, share=0.6, height=0.15, middle=(0.0, 0.05))
+    wall, table, front, grain = (225.0,) * 3, (48.0, 50.0, 52.0), (40.0, 42.0, 44.0), (60.0, 150.0, 190.0)
+    around = Surroundings(wall, table, front, grain, spread=0.2, top=Top(near=4.0, far=1.8), texture=0.01)
+    spheres = heap.spheres(101)
+    lamp, phone = Lamp(direction=(0.3, -0.4, 0.86)), Phone(blur=1.4, noise=6.0, sharpening=0.8, quality=60)
+    angle = measure(render(spheres, heap.height, around, lamp, camera, phone, 101))
+    assert angle.mean > true_angle(*spheres).mean + 2.0
+    assert [doubt.name for doubt in angle.doubts] == ["elevation"]

@@ -171,7 +171,7 @@ data:
 {rows}
 ...
 """
-"""As in https://docs.lammps.org/dump.html; the LAMMPS of Debian 12 has no ``dump yaml``."""
+"""Frame of https://docs.lammps.org/dump.html; the LAMMPS of Debian 12 has no ``dump yaml``."""
 
 
 @pytest.mark.parametrize("columns", ["x, y, z", "xs, ys, zs"])
