@@ -37,7 +37,9 @@ def test_a_design_that_returns_another_thing_is_named_with_its_module(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(DESIGNS, "_outside", {"odd": lambda factors, runs: None})
-    with pytest.raises(InputError, match=r"test_calibrate_stages must return a doe.Design, got None"):
+    with pytest.raises(
+        InputError, match=r"test_calibrate_stages must return a doe.Design of the study's factors, got None"
+    ):
         screening_design(factors(2), ScreeningSettings(design="odd"))
 
 
