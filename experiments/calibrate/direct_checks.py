@@ -19,8 +19,6 @@ class DirectCheck:
     """A direct reading against all else that is known of its factor."""
 
     direct: Direct
-    others: tuple[str, ...]
-    """Responses that it is compared with; empty where the factor was not kept."""
     value: float
     """Value of the factor that suits the others best; where it was not kept, that of all cases."""
     errors: float
@@ -28,6 +26,8 @@ class DirectCheck:
     p: float
     apart: bool
     """True where p is below the level, shared among the direct readings."""
+    others: tuple[str, ...] = ()
+    """Responses that it is compared with; empty where the factor was not kept."""
 
     @property
     def row(self) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def check_direct(study: Study, joint: JointFit | None, alpha: float) -> tuple[Di
             errors = abs(value - sample.mean) / total
             p = TwoErrors(math.inf, sample.df).p(errors, (sample.se / total) ** 2)
         apart = p < alpha / len(study.direct)
-        checks.append(DirectCheck(direct, others, value, errors, p, apart))
+        checks.append(DirectCheck(direct, value, errors, p, apart, others))
     return tuple(checks)
 
 

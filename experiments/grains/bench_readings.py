@@ -24,6 +24,9 @@ PLAIN = {"angle": "deg", "length": "mm", "time": "s"}
 STEP = 1e-4
 """Step of a quantity in its standard deviations at which the formula's slope is taken."""
 
+MOST = 1e15
+"""Largest parameter in SI: a larger one is a slip."""
+
 Columns = Mapping[str, Sequence[Quantity]]
 """Quantities by name, one or as many as there are readings; alone by the name ``""``."""
 
@@ -107,7 +110,7 @@ class Formula:
                 rule = "positive" if math.isinf(high) else "between 0 and 90 deg"
                 raise ValueError(f"{name} must be {rule}, got {value:.4g}")
         found = self._calculated(numbers)
-        high = 1.0 if self.parameter == "restitution" else math.inf
+        high = 1.0 if self.parameter == "restitution" else MOST
         if not 0.0 < found <= high:
             what = "a restitution above 0 and at most 1" if high == 1.0 else "a positive value"
             raise ValueError(f"must give {what}, got {found:.4g} from {shown}")

@@ -71,7 +71,7 @@ def _plane_chart(
         add_region(figure, plane, joint.band(direct.name), f"{direct.name} agrees", _translucent(color))
         along, at = joint.region().axis(y if direct.factor == x else x)[[0, -1]], [direct.measured.mean] * 2
         across, up = (at, along) if direct.factor == x else (along, at)
-        add_line(figure, across, up, f"{direct.name} as measured", color, hoverinfo="skip")
+        add_line(figure, across, up, direct.name, color, hoverinfo="skip", showlegend=False)
     add_region(figure, plane, joint.region(), "all agree", REGION_FILL.replace("0.28", "0.75"))
     add_design(figure, plane, surface.design)
     add_settings(figure, plane, target.truth, optimum.point, "chosen")

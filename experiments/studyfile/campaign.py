@@ -232,14 +232,14 @@ class Direct:
     """Name, other than that of every response."""
     factor: str
     """Factor that it is of."""
-    by: str
-    """Method, e.g. ``incline``."""
-    unit: str
-    """Natural unit of the factor; ``"1"``: a plain number."""
     measured: Sample
-    """Measurements of the factor, in that unit."""
+    """Measurements of the factor, in its natural unit."""
     model_sd: float
     """Standard deviation by which the model's parameter may differ from that of the real surface."""
+    by: str
+    """Method, e.g. ``incline``."""
+    unit: str = "1"
+    """That unit; ``"1"``: a plain number."""
 
     @property
     def title(self) -> str:

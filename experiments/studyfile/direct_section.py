@@ -94,7 +94,7 @@ class DirectSection(Section):
         if model_sd < 0.0:
             raise ValueError(f"model_sd must not be negative, got {model_sd:g}")
         name = self.name or f"{factor.name}_{self.by}".replace("-", "_")
-        return Direct(name, factor.name, self.by, factor.unit or "1", sample, model_sd)
+        return Direct(name, factor.name, sample, model_sd, self.by, factor.unit or "1")
 
     def _sample(self, dimension: str) -> tuple[Formula, Sample | StatedValue]:
         if self.mean is not None:

@@ -12,7 +12,7 @@ from doe import Sample, StatedValue
 from experiments.calibrate import Campaign, calibrate
 from experiments.studyfile.campaign import Direct, Response, Target
 
-RIGHT = Direct("F_incline", "F", "incline", "1", Sample(TRUTH["F"], 0.02, 10), 0.005)
+RIGHT = Direct("F_incline", "F", Sample(TRUTH["F"], 0.02, 10), 0.005, "incline")
 
 
 def study(*direct: Direct, responses: tuple[Response, ...] = (ANGLE,)) -> StandInStudy:
@@ -88,7 +88,7 @@ def test_what_the_others_leave_open_cannot_be_contradicted() -> None:
 
 
 def test_a_factor_that_was_not_kept_is_compared_with_its_middle() -> None:
-    rolling = Direct("G_value", "G", "value", "1", StatedValue(0.08, 0.004), 0.003)
+    rolling = Direct("G_value", "G", StatedValue(0.08, 0.004), 0.003, "value")
     campaign = calibrated(RIGHT, rolling)
     assert "G" not in campaign.selection.kept
     check = campaign.optimum.direct[1]

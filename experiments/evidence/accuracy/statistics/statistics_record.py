@@ -10,6 +10,7 @@ import typer
 
 from experiments.evidence.accuracy.statistics.agreements import agreements
 from experiments.evidence.accuracy.statistics.coverage import AT_LEAST, AT_MOST, SLACK, Figure, figures_table
+from experiments.evidence.accuracy.statistics.direct_coverage import direct_readings
 from experiments.evidence.accuracy.statistics.means import means
 from experiments.evidence.accuracy.statistics.screenings import screenings
 from experiments.evidence.accuracy.statistics.surface_coverage import directions, joint_fits, surfaces
@@ -17,6 +18,7 @@ from experiments.evidence.accuracy.statistics.surface_coverage import directions
 THEMES: dict[str, Callable[[], Iterator[Figure]]] = {
     "surfaces": surfaces,
     "joint_fits": joint_fits,
+    "direct_readings": direct_readings,
     "directions": directions,
     "means": means,
     "screenings": screenings,
@@ -27,6 +29,7 @@ THEMES: dict[str, Callable[[], Iterator[Figure]]] = {
 TITLES = {
     "surfaces": "Surfaces and their regions",
     "joint_fits": "Joint fits",
+    "direct_readings": "Joint fits with direct readings",
     "directions": "Directions of a joint fit",
     "means": "Comparisons of means",
     "screenings": "Screening",
@@ -54,7 +57,9 @@ def page(folder: Path = FOLDER) -> str:
         "continuous in the data holds its level for all ratios of two unknown variances (the problem of "
         "Behrens and Fisher; Linnik 1968), and with one degree of freedom the best one found still goes from "
         ".932 to .968 (`doe.samples.two_errors`). n: measurements behind a target. Spread: standard "
-        "deviation of a measurement over that of a run.",
+        "deviation of a measurement over that of a run. Read: factors measured by themselves, by n "
+        "readings each or with a stated error; model: sd of the model's parameter over the standard error of "
+        "the readings (drawn on 2026-11-27).",
     ]
     for theme, title in TITLES.items():
         table = pd.read_csv(folder / f"{theme}.csv")

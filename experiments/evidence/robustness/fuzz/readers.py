@@ -32,6 +32,7 @@ from doe import DesignError
 from doe.discrepancy import Bank, MechanismRange, SearchSpace, fitted, load_bank
 from experiments.cases import Store
 from experiments.cases.store.outcome_table import OutcomeTable
+from experiments.grains.bench_readings import formula_of, read_columns
 from experiments.grains.clumps.clump_maker import ClumpRequest, make_clump
 from experiments.io.errors import InputError
 from experiments.journal.previews import Previews, read_preview
@@ -237,11 +238,26 @@ def preview(folder: Path) -> Reader:
     return Reader({"seed.npz": content}, read, (ValueError,), checked=True, facts=facts)
 
 
+def readings(folder: Path) -> Reader:
+    """Tables of readings of single grains."""
+    seeds = {
+        "rebound.csv": b"no.,fall [mm],height\n1,300,61.5 mm\n2,300,58 mm\n",
+        "bounces.csv": b"first;second\n0,3 s;0,14\n310 ms;0.15\n",
+    }
+
+    def read(path: Path) -> object:
+        columns = read_columns(path, "rebound")
+        return formula_of("rebound", columns).of_readings(columns)
+
+    return Reader(seeds, read, (ValueError,))
+
+
 READERS: dict[str, Callable[[Path], Reader]] = {
     "study": study,
     "card": card,
     "csv": measured,
     "profiles": profiles,
+    "readings": readings,
     "clump": clump,
     "mesh": mesh,
     "picture": picture,

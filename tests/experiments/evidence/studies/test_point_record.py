@@ -8,6 +8,7 @@ from analytic_heaps import planes
 
 from experiments.calibrate import Campaign, calibrate
 from experiments.evidence.studies.buckwheat.records import point_record
+from experiments.evidence.studies.buckwheat.records.direct_record import narrowed
 from experiments.evidence.studies.buckwheat.records.point_record import (
     CASES,
     STUDY,
@@ -88,3 +89,11 @@ def test_settings_may_end_in_other_digits_on_another_machine(campaign: Campaign)
 def test_a_folder_without_a_campaign_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         gather("bench", tmp_path, tmp_path / "record")
+
+
+def test_readings_of_single_grains_narrow_what_the_tests_leave(campaign: Campaign, study: Study) -> None:
+    hidden = dict(study.target.twin.truth)
+    for table in narrowed(campaign.optimum.joint, hidden):
+        bare, read = table.loc["angle, density"], table.loc["angle, density, F ± 0.01, E ± 0.015"]
+        assert (read[["share", "E"]] < bare[["share", "E"]]).all()
+        assert (table > 0.0).all(axis=None)
