@@ -239,7 +239,7 @@ class Direct:
     by: str
     """Method, e.g. ``incline``."""
     unit: str = "1"
-    """That unit; ``"1"``: a plain number."""
+    """Natural unit of the factor; ``"1"``: a plain number."""
 
     @property
     def title(self) -> str:
