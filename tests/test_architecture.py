@@ -98,18 +98,32 @@ class Source:
         return self.name.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
     @cached_property
+    def statements(self) -> list[tuple[ast.AST, bool]]:
+        """Every statement, and whether it runs only when a function runs or a type is checked."""
+        return list(_statements(self.tree, late=False))
+
+    @cached_property
+    def functions(self) -> list[Function]:
+        return [node for node, _ in self.statements if isinstance(node, Function)]
+
+    @cached_property
     def imports(self) -> list[Import]:
-        return list(_imports(self.tree, self.name, late=False))
+        found = []
+        for node, late in self.statements:
+            if isinstance(node, ast.Import):
+                found += [Import(alias.name, late, f"{self.name}:{node.lineno}") for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                module = "." * node.level + (node.module or "")
+                found.append(Import(module, late, f"{self.name}:{node.lineno}"))
+        return found
 
 
-def _imports(node: ast.AST, name: str, late: bool) -> Iterator[Import]:
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.Import):
-            yield from (Import(alias.name, late, f"{name}:{child.lineno}") for alias in child.names)
-        elif isinstance(child, ast.ImportFrom):
-            yield Import("." * child.level + (child.module or ""), late, f"{name}:{child.lineno}")
-        checked = isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"
-        yield from _imports(child, name, late or checked or isinstance(child, Function))
+def _statements(node: ast.AST, late: bool) -> Iterator[tuple[ast.AST, bool]]:
+    for block in ("body", "orelse", "finalbody", "handlers", "cases"):
+        for child in getattr(node, block, ()):
+            yield child, late
+            checked = isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"
+            yield from _statements(child, late or checked or isinstance(child, Function))
 
 
 @cache
@@ -181,7 +195,7 @@ def test_device_functions_stand_among_laws_and_kernels() -> None:
     homes = {"kernel": ("dem_warp.kernels",), "func": ("dem_warp.kernels", "dem_warp.laws")}
     strays = []
     for source in (s for package in PACKAGES for s in sources(package)):
-        for function in (n for n in ast.walk(source.tree) if isinstance(n, Function)):
+        for function in source.functions:
             for decorator in map(ast.unparse, function.decorator_list):
                 kind = re.match(r"(?:wp|warp)\.(kernel|func)\b", decorator)
                 if kind and not source.module.startswith(homes[kind[1]]):
@@ -263,7 +277,7 @@ def test_input_is_checked_by_errors_that_python_cannot_leave_out() -> None:
         f"{source.name}:{node.lineno}"
         for package in PACKAGES
         for source in sources(package)
-        for node in ast.walk(source.tree)
+        for node, _ in source.statements
         if isinstance(node, ast.Assert)
     ]
     assert asserts == []
@@ -277,8 +291,8 @@ def test_functions_are_short() -> None:
     long = {
         f"{source.name}:{node.lineno} {node.name}": own_lines(node)
         for source in everything()
-        for node in ast.walk(source.tree)
-        if isinstance(node, Function) and own_lines(node) >= MAX_FUNCTION_LINES
+        for node in source.functions
+        if own_lines(node) >= MAX_FUNCTION_LINES
     }
     assert long == {}
 

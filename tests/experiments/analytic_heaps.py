@@ -12,7 +12,6 @@ from experiments.studyfile import Study
 from experiments.studyfile.campaign import CampaignSettings, Direct, Target
 
 Angle = Callable[[Mapping[str, float]], float]
-Runner = Callable[[pd.DataFrame], pd.DataFrame]
 
 NOISE = 0.35
 """Standard deviation of one analytic heap [deg]."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 
 from dem_warp import CaseResult
 from dem_warp.clump_fitting import fit_clump
+from experiments.cases import execute
 from experiments.cases.forecast import speed
 from experiments.report import solid
 from experiments.studyfile import Study, load_study
@@ -49,12 +51,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(scope="session", autouse=True)
 def _small_pictures() -> Iterator[None]:
-    """Draw the picture that stands for a heap to be turned at a fifth of its width: most pages have one.
+    """Draw the picture that stands for a heap to be turned at a fifth of its width, and measure in a thread.
 
-    `report/test_solid.py` draws it as users get it.
+    `report/test_solid.py` draws and `discover/test_engine.py` measures as users do.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(solid, "PIXELS", solid.PIXELS // 5)
+        patch.setattr(execute, "measuring_processes", lambda *_: ThreadPoolExecutor(1))
         yield
 
 
@@ -122,7 +125,7 @@ def cone() -> Callable[..., CaseResult]:
     """Build the result of a case that ended in a cone of spheres with a given slope."""
 
     def build(
-        slope: float = 0.5, status: str = "finished", reason: str = "", radius: float = 0.5e-3
+        slope: float = 0.5, status: str = "finished", reason: str = "", radius: float = 1e-3
     ) -> CaseResult:
         from cone_engine import cone_of
 

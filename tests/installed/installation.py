@@ -30,8 +30,10 @@ class Installed:
 
 
 def pip(*arguments: object) -> None:
-    """Run pip without the network and without other packages."""
-    _output([sys.executable, "-m", "pip", *arguments, "--no-deps", "--quiet", "--disable-pip-version-check"])
+    """Run pip without the network and without other packages; Python compiles what it imports."""
+    environment = os.environ | {"PIP_COMPILE": "no"}
+    words = [sys.executable, "-m", "pip", *arguments, "--no-deps", "--quiet", "--disable-pip-version-check"]
+    _output(words, env=environment)
 
 
 def build(project: Path, names: Sequence[str], folder: Path) -> Path:

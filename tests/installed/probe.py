@@ -1,25 +1,31 @@
-"""Program for a fresh interpreter: the additions of an installed package, and results without them.
+"""Program for a fresh interpreter: the additions of an installed package, and what commands do with them.
 
-It prints one JSON object. Its argument is the folder of the tests of `dem_warp`, for worlds of two grains.
+It prints one JSON object. Its arguments are the folders of tests whose helpers it takes and commands as JSON.
 """
 
+import gc
 import json
 import logging
 import sys
 
+gc.disable()
 warnings: list[str] = []
 logging.basicConfig(level=logging.WARNING)
 logging.getLogger("dem_warp.registry").addFilter(lambda record: not warnings.append(record.getMessage()))
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = sys.argv[1:-1]
 
+import pytest
+from commandline import dem_warp
 from worlds import RADIUS, ball_mass, grains, pair, record, small_case, solve, world
 
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.scenes.library import SCENES
 from experiments.calibrate.screening_stage import DESIGNS
 from experiments.cases import ENGINES, Store
+from experiments.cases.show import heap
 from experiments.discover.mechanism_files import library_for
 from experiments.export import EXPORTERS
+from experiments.runs import calibration
 from experiments.studyfile import load_study
 from experiments.studyfile.mechanism_factor import with_mechanisms
 
@@ -47,4 +53,9 @@ if "magnetism" in MECHANISMS:
     found["force"] = law.magnetic_force
     found["accelerations"] = [(approach(law) - approach()) * ball_mass() / 1e-6]
     found["keys by engine"] = [Store("cases", ENGINES["cones"]).key(case)]
+    found["conformance"] = pytest.main(["-q", "-p", "no:cacheprovider", "conformance.py"])
+    heap._write_pictures = lambda *_: None
+    calibration.heap_pictures = lambda *_: []
+    calibration.verified_heap = lambda *_: None
+found["commands"] = [dem_warp(*words) for words in json.loads(sys.argv[-1])]
 print(json.dumps(found | {"warnings": warnings}))

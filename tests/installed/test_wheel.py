@@ -49,7 +49,3 @@ for study in (load_study(None, "bench"), load_study(example, "bench")):
     print(len(study.case({}, seed=1).to_dict()["grains"]["shape"]["radii"]))
 """
     assert installed.python("-c", program).split() == ["9", "3"]
-
-
-def test_an_installed_command_explains_itself(installed: Installed) -> None:
-    assert "Example: dem-warp calibrate" in " ".join(installed.dem_warp("calibrate", "-h").split())

@@ -9,6 +9,7 @@ import pytest
 from dem_warp import Case, CaseResult, Progress, simulate
 from doe.discrepancy import Point
 from experiments.cases import OwnWorkers, execute
+from experiments.cases.measuring import measuring_processes
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.workers import own
 from experiments.discover.engine_simulator import EngineSimulator
@@ -69,6 +70,7 @@ def build(study: Study, table: OutcomeTable) -> EngineSimulator:
 def test_points_are_answered_by_heaps_measured_and_kept(
     study: Study, table: OutcomeTable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(execute, "measuring_processes", measuring_processes)
     seen: list[Progress] = []
     with build(study, table) as simulator:
         outcomes = simulator([*POINTS, POINTS[0]], seen.append)

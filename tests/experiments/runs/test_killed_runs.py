@@ -2,48 +2,26 @@
 
 import json
 import os
-import traceback
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
-import pyvista
-import warp
 from commandline import dem_warp
 from cone_engine import SEEDS, cone_engine, observe, without_pages
 
-from dem_warp import simulation
-from dem_warp.provenance import engine_fingerprint
 from experiments.cases import execute
 from experiments.cases.engines import engines
 from experiments.cases.show import heap
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.discover import engine_simulator
-from experiments.runs import bridging, calibration, one_heap, search
-
-LOADED = (bridging, calibration, one_heap, pyvista, search, simulation, warp)
-"""Modules that each process would load anew."""
 
 KILLS = 10
 KILLED = 99
 """Exit code of a process that was killed."""
-
-
-class Direct(Executor):
-    """Measures at once, in this process."""
-
-    def submit(self, function: Callable[..., Any], /, *arguments: Any, **_: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        future.set_result(function(*arguments))
-        return future
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        pass
-
 
 FEW = """
 [campaign.noise_floor]
@@ -70,24 +48,22 @@ class Command:
 
     def __post_init__(self) -> None:
         self.whole = self.folder / "whole"
-        code, self.writes = self.run(self.whole)
-        assert code == 0, (self.folder / "trace.txt").read_text()
+        self.writes = self.run(self.whole)
 
-    def run(self, out: Path, *more: str, kill_at: int | None = None) -> tuple[int, int]:
-        """Run it in a process of its own; return its exit code, and how much it has written."""
-        count = self.folder / "count.txt"
+    def run(self, out: Path, *more: str) -> int:
+        """Run it to its end; return how much it has written."""
+        with writes_counted() as count:
+            code, _, said = dem_warp(*self.words, "--out", out, *more)
+        assert code == 0, said
+        return count.number
+
+    def kill(self, out: Path, at: int) -> int:
+        """Run it in a copy of this process until its write of some number; return its exit code."""
         if (child := os.fork()) == 0:
-            code = 70
-            try:
-                with writes_counted(count, kill_at):
-                    code, _, said = dem_warp(*self.words, "--out", out, *more)
-                    (self.folder / "trace.txt").write_text(said)
-            except BaseException:
-                (self.folder / "trace.txt").write_text(traceback.format_exc())
-            finally:
-                os._exit(code)
-        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        return status, int(count.read_text())
+            with suppress(BaseException), writes_counted(at):
+                dem_warp(*self.words, "--out", out)
+            os._exit(0)
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
     def found(self, out: Path) -> Any:
         """Read its results."""
@@ -101,16 +77,17 @@ class Command:
 class writes_counted:  # noqa: N801
     """Count what is put in place or saved, and end the process at once before the last that is allowed."""
 
-    def __init__(self, count: Path, kill_at: int | None) -> None:
-        self.count, self.kill_at, self.number = count, kill_at, 0
+    def __init__(self, kill_at: int | None = None) -> None:
+        self.kill_at, self.number = kill_at, 0
 
-    def __enter__(self) -> None:
+    def __enter__(self) -> Self:
         self.replace, self.save = os.replace, OutcomeTable.save
         os.replace = self.counted(self.replace)  # type: ignore[assignment]
         OutcomeTable.save = self.counted(self.save)  # type: ignore[method-assign]
+        return self
 
     def __exit__(self, *error: object) -> None:
-        self.count.write_text(str(self.number))
+        os.replace, OutcomeTable.save = self.replace, self.save  # type: ignore[assignment,method-assign]
 
     def counted(self, write: Callable[..., Any]) -> Callable[..., Any]:
         def counting(*arguments: Any, **rest: Any) -> Any:
@@ -118,7 +95,6 @@ class writes_counted:  # noqa: N801
             if Path(str(arguments[1])).name not in ("progress.json", "batches.json"):
                 self.number += 1
                 if self.number == self.kill_at:
-                    self.count.write_text(str(self.number))
                     os._exit(KILLED)
             return write(*arguments, **rest)
 
@@ -132,12 +108,10 @@ def _stand_ins(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     def measure(_: Any, result: Any, names: tuple[str, ...]) -> tuple[np.ndarray, str]:
         return result.observables["truth"] + np.arange(len(names)), ""
 
-    engine_fingerprint()  # once, before the processes part
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(engines._DRIVERS, "cones", cone_engine)
         patch.setattr(execute, "observe", observe)
         patch.setattr(execute, "SAVE_EVERY", 0.0)
-        patch.setattr(execute, "measuring_processes", lambda *_: Direct())
         patch.setattr(engine_simulator, "measure", measure)
         without_pages(patch)
         patch.setattr(heap, "_write_pictures", lambda *_: None)
@@ -183,9 +157,8 @@ def test_a_run_killed_at_ten_points_is_resumed_to_the_same_results(command: Comm
     for kill_at in points:  # fewer where a command writes less often
         out = tmp_path / str(kill_at)
         before = len(simulated())
-        assert command.run(out, kill_at=kill_at)[0] == KILLED
-        resume = ("--resume",) if (out / "study.json").is_file() else ()
-        assert command.run(out, *resume)[0] == 0, (command.folder / "trace.txt").read_text()
+        assert command.kill(out, kill_at) == KILLED
+        command.run(out, *(["--resume"] if (out / "study.json").is_file() else []))
         assert command.found(out) == command.found(command.whole)
         if cases:  # the case that was being saved is simulated again
             assert cases <= len(simulated()) - before <= cases + 1

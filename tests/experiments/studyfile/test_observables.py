@@ -28,7 +28,7 @@ Cone = Callable[..., CaseResult]
 
 def heap(cone: Cone, shift: float = 0.0) -> CaseResult:
     """Draw a cone of slope 0.5, its lower parts sheared along x by their distance from the top."""
-    result = cone(0.5)
+    result = cone(0.5, radius=0.5e-3)
     positions = result.positions + np.outer(0.5 * BASE - result.positions[:, 2], [shift, 0.0, 0.0])
     return replace(result, positions=positions, observables=BALANCE | {"time_to_rest": 2.0})
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from dem_warp import Case, CaseResult
 
-RADIUS, BASE = 0.5e-3, 20e-3
+RADIUS, BASE = 1e-3, 20e-3
 """Radii of a sphere and of the cone [m]."""
 
 

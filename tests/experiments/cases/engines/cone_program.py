@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-RADIUS, BASE = 0.5e-3, 20e-3
+RADIUS, BASE = 1e-3, 20e-3
 
 
 def cone(slope):

@@ -11,14 +11,13 @@ from typing import Any
 import pytest
 
 from dem_warp import MECHANISMS, SCENES, CaseResult, simulate
-from experiments.cases import OwnWorkers, Resources, open_workers
+from experiments.cases import OwnWorkers
 from experiments.cases.forecast import speed
 from experiments.cases.forecast.speed import (
     Load,
     expected_seconds,
     forecast,
     note_batch,
-    noted_batches,
     noted_speed,
     source_of,
 )
@@ -171,21 +170,6 @@ def test_a_slow_first_start_is_no_part_of_the_speed(
     for index in (0, 1):
         call.take(index, cone())
     assert call.pace == (pytest.approx(0.8), pytest.approx(8.0))
-
-
-def test_one_and_two_workers_measure_much_the_same_speed_of_a_worker(
-    small_study: Study, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(speed, "LEAST_SECONDS", 0.0)
-    monkeypatch.setattr(speed, "LEAST_PART", 0.0)
-    speeds = []
-    for count in (1, 2):
-        with open_workers(Resources("cpu", count)) as workers:
-            for cases in (count, 4 * count):  # the first call starts the processes
-                workers.simulate([small_study.case({}, seed) for seed in range(cases)])
-        speeds.append(noted_batches()[-1][1])
-    one, two = speeds
-    assert 0.2 < two / one < 5.0  # a machine that is busy with other work halves a core, or gives it twice
 
 
 def test_a_finished_batch_notes_its_speed(small_study: Study, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,19 +52,11 @@ def test_jobs_that_are_refused_end_the_command_in_the_message_of_the_batch_syste
     write_study: Callable[..., Path], profile: Path, tmp_path: Path
 ) -> None:
     """A process of its own, as Dask would print its tracebacks when that ends."""
-    path, out = (
-        install(tmp_path / "bin" / "sbatch", f"#!/bin/sh\necho '{REFUSES}' >&2; exit 1"),
-        tmp_path / "out",
-    )
+    path = install(tmp_path / "bin" / "sbatch", f"#!/bin/sh\necho '{REFUSES}' >&2; exit 1")
+    out = tmp_path / "out"
     words = ["calibrate", str(write_study()), "--cluster", str(profile), "--out", str(out)]
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *words],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PATH": str(path)},
-        timeout=60,
-        check=False,
-    )
+    command, environment = [sys.executable, "-c", PROGRAM, *words], os.environ | {"PATH": str(path)}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
     assert done.returncode == 2
     assert f"sbatch refuses the jobs: {REFUSES}" in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr

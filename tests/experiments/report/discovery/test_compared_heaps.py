@@ -80,7 +80,7 @@ def test_a_photograph_without_a_heap_is_left_out(tmp_path: Path) -> None:
 def test_simulated_heaps_share_a_scale_and_a_failed_one_is_left_out(
     cone: Callable[..., CaseResult], trial: Study
 ) -> None:
-    small = cone(slope=0.4)
+    small = cone(slope=0.4, radius=0.5e-3)
     large = replace(small, positions=1.5 * small.positions, clumps=1.5 * small.clumps)
     models = {"small": small, "large": large, "clogged": cone(status="failed", reason="clogged")}
     drawn = simulated_heaps(models, "base", trial)
