@@ -51,10 +51,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(scope="session", autouse=True)
 def _small_pictures() -> Iterator[None]:
-    """Draw the picture that stands for a heap to be turned at a fifth of its width, and measure in a thread.
-
-    `report/test_solid.py` draws and `discover/test_engine.py` measures as users do.
-    """
+    """Draw heaps to be turned at a fifth of their width, and measure in a thread; a test of each does not."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(solid, "PIXELS", solid.PIXELS // 5)
         patch.setattr(execute, "measuring_processes", lambda *_: ThreadPoolExecutor(1))
