@@ -219,7 +219,7 @@ def counts() -> list[Count]:
         Count("experiments, floors", max(heights(own).values()), 10),
         Count("experiments, imports between rooms", len(own), 65),
         Count("experiments, imports upwards", circles_broken(own)[1], 0),
-        Count("evidence, lines", lines(python_files(EVIDENCE)), 18_071),
+        Count("evidence, lines", lines(python_files(EVIDENCE)), 18_000),
         Count("imaging, floors", max(heights(pictures).values()), 8),
         Count("imaging, imports between rooms", len(pictures), 50),
         Count(
@@ -229,7 +229,7 @@ def counts() -> list[Count]:
         ),
         Count("installed, lines", lines(name for name in installed() if name.endswith(".py")), 61_232),
         Count("wheel [MB]", wheel_megabytes(), 1.5),
-        Count("tests, lines", lines(python_files("tests/")), 36_047),
+        Count("tests, lines", lines(python_files("tests/")), 36_184),
         Count("tracked data [MB]", megabytes(data), 16.0),
         Count("hard dependencies", len(hard_dependencies()), 18),
         Count("pairs of files with like code", len(like_code()), 150),

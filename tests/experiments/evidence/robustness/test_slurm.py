@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import slurm_node as slurm
 
 from dem_warp import CaseResult
 from experiments.cases import OwnWorkers, Resources, open_workers
-from experiments.evidence.robustness import slurm
 from experiments.studyfile import load_study
 from experiments.studyfile.cluster_section import read_profile
 
