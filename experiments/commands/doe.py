@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,8 +30,6 @@ OPTIMUM_EXAMPLE = "Example: [bold]dem-warp doe optimum runs.csv --wish angle=28.
 
 CLIMB_EXAMPLE = "Example: [bold]dem-warp doe climb climb.csv --target 28.6[/]"
 COMPARE_EXAMPLE = "Example: [bold]dem-warp doe compare runs.csv --value simulated --reference measured[/]"
-
-WISH = re.compile(r"(?P<aim>[^:]+)(?::\s*(?P<low>[^.\s]+(?:\.\d+)?)\s*\.\.\s*(?P<high>\S+))?")
 
 Table = Annotated[Path, typer.Argument(metavar="TABLE.csv", help="Runs: factors, and at least one response.")]
 Factors = Annotated[
@@ -168,6 +165,9 @@ def fit(
         from experiments.commands.tables import answers
 
         asked = [response] if response else []
+        if (formula or mixture) and (at or reduce):
+            option = "--at" if at else "--reduce"
+            raise InputError(option, "needs a polynomial of factors, not --formula or --mixture")
         if mixture:
             answer = answers.fit_mixture_table(table, asked, model)
         else:
@@ -176,7 +176,8 @@ def fit(
             if formula:
                 answer = answers.fit_formula_table(sheet, name, formula)
             else:
-                answer, surface = answers.fit_table(sheet, name, _terms(model), alpha, reduce)
+                surface = answers.fitted(sheet, name, _terms(model), alpha, reduce)
+                answer = answers.describe_fit(surface, name, alpha)
                 _predict(answer, surface, at or [], alpha)
     _show(answer, out, as_json, str(table))
 
@@ -207,7 +208,7 @@ def optimum(
 ) -> None:
     """Find the setting that comes nearest to the aims of one response or several."""
     with clear_errors():
-        from experiments.commands.tables.answers import best_setting, fit_table
+        from experiments.commands.tables.answers import best_setting, fitted
 
         aims = assignments(wish, "--wish", "angle=28.6")
         sheet = _sheet(table, factor, list(aims), block)
@@ -216,7 +217,7 @@ def optimum(
             name: _wish(aim, sheet.responses[name], alone=len(aims) == 1)
             for name, aim in zip(names, aims.values(), strict=True)
         }
-        surfaces = {name: fit_table(sheet, name, _terms(model), alpha, reduce)[1] for name in names}
+        surfaces = {name: fitted(sheet, name, _terms(model), alpha, reduce) for name in names}
         answer = best_setting(surfaces, wishes, extent, constraint or [], seed)
     _show(answer, out, as_json, str(table))
 
@@ -288,24 +289,23 @@ def _terms(model: str) -> str | list[str]:
 def _wish(aim: str, values: pd.Series, alone: bool) -> Wish | str:
     """Read an aim; without ends its scale is that of the runs."""
     from doe import Wish
+    from experiments.commands.tables.sheet import LEVELS
+    from experiments.io.texts import is_number
 
-    parts = WISH.fullmatch(aim)
-    target = _number_or_word(parts["aim"].strip()) if parts else ""
-    if not parts or (isinstance(target, str) and target not in ("max", "min")):
-        raise InputError(
-            "--wish", "needs max, min or a number as its aim", aim, "For example angle=28.6:25..32."
-        )
-    ends = [_number_or_word(parts[end]) for end in ("low", "high")]
-    if any(isinstance(end, str) for end in ends):
-        raise InputError("--wish", "needs numbers as the ends of its scale", aim)
+    text, colon, scale = (part.strip() for part in aim.partition(":"))
+    target, ends = float(text) if is_number(text, ",") else text, LEVELS.fullmatch(scale)
+    if (isinstance(target, str) and target not in ("max", "min")) or (colon and not ends):
+        rule = "needs max, min or a number as its aim, and numbers as the ends of its scale"
+        raise InputError("--wish", rule, aim, "For example angle=28.6:25..32.")
+    given = (float(ends["low"]), float(ends["high"])) if ends else None
     if isinstance(target, str):
-        if alone and ends[0] is None:
+        if alone and given is None:
             return target
-        low, high = (values.min(), values.max()) if ends[0] is None else ends
-        return Wish(float(low), float(high), larger=target == "max")  # type: ignore[arg-type]
-    reach = max(abs(values - target)) if ends[0] is None else None
-    low, high = (target - reach, target + reach) if reach is not None else ends
-    return Wish(float(low), float(high), target=target)  # type: ignore[arg-type]
+        low, high = given or (float(values.min()), float(values.max()))
+        return Wish(low, high, larger=target == "max")
+    reach = float(abs(values - target).max())
+    low, high = given or (target - reach, target + reach)
+    return Wish(low, high, target=target)
 
 
 def _predict(answer: Answer, surface: Any, points: list[str], alpha: float) -> None:

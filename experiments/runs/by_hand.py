@@ -63,7 +63,11 @@ def typed_cases(study: Study, table: pd.DataFrame, folder: Path, title: str, sto
         raise AwaitingRuns(_waiting(path, len(fresh)))
     _require_unchanged(study, table, keys, filled)
     _require_filled(keys, filled, responses)
-    known = {key: _result(filled[key], of) for key, of in zip(keys, responses, strict=True) if key}
+    known = {
+        key: _result(filled[key], of, study.measurement.fit)
+        for key, of in zip(keys, responses, strict=True)
+        if key
+    }
     lost = {"status": "refused", ANGLE: math.nan, "angle_se": math.nan}
     results = [
         known[key] if key else lost | {"reason": reason} for key, reason in zip(keys, refused, strict=True)
@@ -179,7 +183,7 @@ def _is_filled(row: Row, responses: Sequence[Response]) -> bool:
     return FAILED in cells or all(row[next(_heads([each]))] for each in needed)
 
 
-def _result(row: Row, responses: Sequence[Response]) -> dict[str, Any]:
+def _result(row: Row, responses: Sequence[Response], fit: str) -> dict[str, Any]:
     """Read the results of a run."""
     result: dict[str, Any] = {"status": "finished", "reason": "", ANGLE: math.nan, "angle_se": math.nan}
     if FAILED in [row[head] for head in _heads(responses)]:
@@ -187,7 +191,7 @@ def _result(row: Row, responses: Sequence[Response]) -> dict[str, Any]:
     for response in responses:
         head = next(_heads([response]))
         if response.observable == ANGLE and not row[head]:
-            result |= _pictured(row)
+            result |= _pictured(row, fit)
             continue
         if not is_number(row[head]):
             raise row.error("must be a number", head)
@@ -195,9 +199,9 @@ def _result(row: Row, responses: Sequence[Response]) -> dict[str, Any]:
     return result
 
 
-def _pictured(row: Row) -> dict[str, Any]:
-    """Measure the picture, or the file of spheres, that a row names."""
-    [measured] = measure_pictures([row.file.parent / row[PICTURE]], PictureOptions())
+def _pictured(row: Row, fit: str) -> dict[str, Any]:
+    """Measure the picture, or the file of spheres, that a row names, by the study's fit."""
+    [measured] = measure_pictures([row.file.parent / row[PICTURE]], PictureOptions(fit))
     if measured["mean"] is None:
         raise row.error(f"shows no angle: {measured['reason']}", PICTURE)
     return {ANGLE: measured["mean"], "angle_se": measured["se"]}

@@ -188,11 +188,14 @@ def compare_columns(sheet: Sheet, value: str, reference: str) -> Answer:
     return answer
 
 
-def fit_table(sheet: Sheet, name: str, model: Any, alpha: float, reduced: bool) -> tuple[Answer, Surface]:
-    """Fit a response surface to a table of runs."""
-    design, values = sheet.observed(name)
-    whole = doe.fit_surface(design, values, model)
-    surface = whole.reduce(alpha) if reduced else whole
+def fitted(sheet: Sheet, name: str, model: str | list[str], alpha: float, reduced: bool) -> Surface:
+    """Fit a response surface to a table of runs, without insignificant terms if it is to be reduced."""
+    whole = doe.fit_surface(*sheet.observed(name), model)
+    return whole.reduce(alpha) if reduced else whole
+
+
+def describe_fit(surface: Surface, name: str, alpha: float) -> Answer:
+    """Describe a fitted surface: tests, quality, canonical analysis, residuals."""
     answer = Answer(f"Response surface of {name}", [surface.summary()])
     answer.tables["coefficients"] = "Coefficients in coded units.", surface.coefficient_table
     answer.tables["anova"] = "Analysis of variance by term.", surface.anova
@@ -206,7 +209,7 @@ def fit_table(sheet: Sheet, name: str, model: Any, alpha: float, reduced: bool) 
     _add_checks(answer, surface)
     answer.draw("residuals", "Residuals.", lambda: plots.residual_plots(surface))
     _add_surface_plots(answer, surface, name)
-    return answer, surface
+    return answer
 
 
 def _fit_quality(surface: Surface) -> pd.DataFrame:

@@ -157,6 +157,8 @@ def test_columns_of_other_programs_are_not_factors() -> None:
         ("A,y\n1,2\n2,3\n", ["fit", "--response", "z"], "has no column 'z'; known: A, y"),
         ("A,y\n1,2\n2,3\n", ["fit", "--model", "cubic"], "no factor is named 'cubic'"),
         ("A,y\n1,2\n2,3\n", ["optimum", "--wish", "y=best"], "--wish: needs max, min or a number as its aim"),
+        ("A,y\n1,2\n2,3\n", ["optimum", "--wish", "y=max:3..high"], "numbers as the ends of its scale"),
+        ("A,y\n1,2\n2,3\n", ["fit", "--formula", "A", "--reduce"], "--reduce: needs a polynomial"),
         ("A,y\n1,2\n2,3\n", ["screen", "--error", "mine"], "error"),
         ("A,y\n1,2\n2,3\n3,5\n", ["fit", "--model", "A", "--out", "."], "must be a new or an empty folder"),
     ],

@@ -8,8 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from commandline import dem_warp
+from cone_engine import cone_of
 
 from doe import Design, Factor, fit_surface
+from experiments.io.rows import Row
+from experiments.runs import by_hand
 from experiments.studies.buckwheat.paper import published
 
 STUDY = Path(__file__).parents[3] / "experiments" / "studies" / "buckwheat"
@@ -120,6 +123,17 @@ def test_a_sheet_that_is_not_as_it_was_written_is_refused(study: Path) -> None:
         assert code == 2
         assert message in said
         assert not Path("run/report.html").exists()
+
+
+@pytest.mark.parametrize("fit", ["flank", "middle"])
+def test_the_spheres_of_a_run_are_measured_as_the_study_measures(fit: str, tmp_path: Path) -> None:
+    cone = cone_of(0.5)
+    rows = np.column_stack([cone.sphere_centers, cone.sphere_radii])
+    pd.DataFrame(rows, columns=list("xyzr")).to_csv(tmp_path / "cone.csv", index=False)
+    found = by_hand._pictured(Row(tmp_path / "sheet.csv", 2, {by_hand.PICTURE: "cone.csv"}), fit)
+    code, out, _ = dem_warp("angle", tmp_path / "cone.csv", "--fit", fit, "--json")
+    assert code == 0
+    assert found["angle"] == json.loads(out)["pictures"][0]["mean"]
 
 
 def test_only_a_campaign_waits_for_a_person(study: Path) -> None:
