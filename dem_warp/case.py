@@ -1,6 +1,6 @@
 """One simulation: scene, grains, contacts, seed and numerics."""
 
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from dem_warp.laws.conventions import EDEM, ContactLaws
@@ -32,6 +32,10 @@ class Numerics:
 
     def __post_init__(self) -> None:
         check_parameters(self)
+
+    def softened(self, material: Material) -> Material:
+        """Return a material of grains with the simulated shear modulus."""
+        return replace(material, shear_modulus=material.shear_modulus / self.modulus_scale)
 
 
 @dataclass(frozen=True)
@@ -67,10 +71,7 @@ class Case(Generic[SceneT]):
     @property
     def grain_material(self) -> Material:
         """Material of the grains with the simulated shear modulus."""
-        material = self.grains.material
-        return Material(
-            material.density, material.shear_modulus / self.numerics.modulus_scale, material.poisson_ratio
-        )
+        return self.numerics.softened(self.grains.material)
 
     @property
     def time_step(self) -> float:

@@ -20,6 +20,9 @@ from dem_warp.walls import Wall
 GRAVITY = 9.81
 """Gravity [m/s2]."""
 
+CELLS_ACROSS = 3
+"""Fewest cells of a period, so that a search meets none twice."""
+
 ROLLING_OVERLAP = 0.01
 """Overlap of equal spheres, over their radius, where a default rolling spring equals the tangential one."""
 
@@ -196,8 +199,13 @@ class WorldSetup:
     """True if rolling resistance stops a spin and never reverses it."""
     forms: LawForms = BASE_FORMS
     """Forms of the contact law."""
-    weighed: Annotated[int | None, Parameter("1", at_least=0)] = None
-    """Number of the wall whose impulse is summed up in every step (`Solver.impulses`)."""
+    weighed: tuple[int, ...] = ()
+    """Numbers of the walls whose impulses are summed up in every step (`Solver.impulses`)."""
+    free_wall: Annotated[int | None, Parameter("1", at_least=0)] = None
+    """Number of the wall, one of the weighed, whose motion may have a mass."""
+    period: Annotated[float | None, Parameter("m", above=0.0)] = None
+    """Length after which the world repeats itself along x and y, about the middle of its domain. Walls must
+    be alike everywhere; they stay in place along x and y, whatever their velocity. Default: it does not."""
 
     def __post_init__(self) -> None:
         check_parameters(self)
@@ -207,9 +215,15 @@ class WorldSetup:
         last = len(self.contacts) - 1
         if bad := [contact for _, contact in self.walls if not 1 <= contact <= last]:
             raise ValueError(f"WorldSetup.walls: each must have a contact from 1 to {last}, got {bad[0]}")
-        if self.weighed is not None and self.weighed >= len(self.walls):
-            rule = f"must be the number of a wall, 0 to {len(self.walls) - 1}"
+        if not set(self.weighed) <= set(range(len(self.walls))) or len(set(self.weighed)) < len(self.weighed):
+            rule = f"must be different numbers of walls, 0 to {len(self.walls) - 1}"
             raise ValueError(f"WorldSetup.weighed: {rule}, got {self.weighed!r}")
+        if self.free_wall is not None and self.free_wall not in self.weighed:
+            raise ValueError(f"WorldSetup.free_wall: must be a weighed wall, got {self.free_wall!r}")
+        if self.period is not None and self.triangle_count:
+            raise ValueError("WorldSetup.period: walls must not be meshes, which are not alike everywhere")
+        if self.period is not None and self.period < (least := CELLS_ACROSS * self.cell):
+            raise ValueError(f"WorldSetup.period: must be at least {least:.3g} [m], got {self.period!r}")
         spheres = max(shape.sphere_count for shape in self.shapes)
         if spheres > MAX_SPHERES_PER_GRAIN:
             rule = f"each must have at most {MAX_SPHERES_PER_GRAIN} spheres"
@@ -221,7 +235,7 @@ class WorldSetup:
 
     @property
     def force_rate(self) -> float:
-        """Counts of the summed forces on the weighed wall [1/N]: a power of two, about 2**30 for all grains.
+        """Counts of the summed forces on a weighed wall [1/N]: a power of two, about 2**30 for all grains.
 
         Single forces then have an error of 1e-5 of a small grain's weight among 1e4, and 64 bits hold the sum
         over 1e9 steps.
@@ -255,6 +269,11 @@ class WorldSetup:
         )
 
     @property
+    def cell(self) -> float:
+        """Width of a cell of the search [m]: the reach of a list and 1 %."""
+        return 1.01 * (2 * self.largest_sphere + self.skin + self.reach)
+
+    @property
     def masses(self) -> np.ndarray:
         """Mass of each grain [kg], (n,)."""
         volume = np.array([shape.volume for shape in self.shapes])
@@ -284,8 +303,12 @@ class WorldSetup:
 
     @property
     def length_unit(self) -> float:
-        """Unit of fixed-point positions [m]: a power of two; 31 bits span the domain and a margin."""
-        return float(2.0 ** np.ceil(np.log2(1.05 * self.half_extent.max() / 2**31)))
+        """Unit of fixed-point positions [m]: a power of two; 31 bits span the domain and a margin.
+
+        Twice the distance of places in a period has to have as many bits.
+        """
+        extent = max(float(self.half_extent.max()), 2.5 * (self.period or 0.0))
+        return float(2.0 ** np.ceil(np.log2(1.05 * extent / 2**31)))
 
 
 def shape_table(worlds: Sequence[WorldSetup]) -> list[ClumpShape]:

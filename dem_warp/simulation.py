@@ -125,7 +125,8 @@ def batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
     for i, case in enumerate(cases):
         mechanisms = frozenset(mechanism.name for mechanism in case.mechanisms)
         kind, forms = type(case.scene), case.laws.forms
-        parts = len(case.wall_parts)
-        build = (kind, case.numerics.precision, case.grains.sphere_count, mechanisms, forms, parts)
+        spheres = case.grains.sphere_count * getattr(case.scene, "sledge", 1)
+        parts = len(case.wall_parts), len(getattr(case.scene, "wall_names", ()))
+        build = (kind, case.numerics.precision, spheres, mechanisms, forms, parts)
         groups.setdefault(build, []).append(i)
     return list(groups.values())

@@ -79,7 +79,8 @@ class Solver:
         layout = self.layout
         self.build = Build(
             self.precision, layout.sphere_count, layout.wall_count, self.device.is_cuda,
-            layout.mechanisms, layout.has_mesh, layout.forms,
+            layout.mechanisms, layout.has_mesh, layout.has_free_wall,
+            layout.is_periodic, layout.forms,
         )  # fmt: skip
         self._step_kernels = step_kernels(self.build)
         self._cell_kernels = cell_kernels(self.build.without_forces)
@@ -156,10 +157,15 @@ class Solver:
 
     def _step(self, read: int) -> None:
         self._commands[read].launch()
+        if self.layout.has_free_wall:
+            inputs = [self.model, self.idle, self.grains[1 - read], self.neighbours]
+            self._launch(self._wall_kernels.carry, self.layout.world_count, inputs)
 
     def _place_walls(self, ahead: int, read: int = 0) -> None:
         frames = len(self.worlds) * self.layout.wall_count * (ahead + 1)
-        self._launch(self._wall_kernels.place_walls, frames, [ahead, self.model, self.grains[read]])
+        self._launch(
+            self._wall_kernels.place_walls, frames, [ahead, self.model, self.grains[read], self.neighbours]
+        )
 
     def _rebuild(self, read: int) -> None:
         spheres, grains = self.layout.sphere_total, self.grains[read]
@@ -293,6 +299,12 @@ class Solver:
         steps = self.grains[0].step.numpy()
         self._place_walls(0)
         for world, wall, motion in moves:
+            if motion.mass and wall != self.worlds[world].free_wall:
+                raise ValueError(
+                    f"Motion.mass: must be 0 for wall {wall}, which is not free, got {motion.mass!r}"
+                )
+            if wall == self.worlds[world].free_wall:
+                self.neighbours.lift[world : world + 1].zero_()
             row = walls[world * self.layout.wall_count + wall]
             row["start_step"] = steps[world]
             frame = self._frame(world, wall).numpy()[0]
@@ -320,12 +332,15 @@ class Solver:
         return self.model.frame[place : place + 1]
 
     def impulses(self) -> np.ndarray:
-        """Return the impulse of the grains on the weighed wall of each world along z, from step 0 [N s].
+        """Return the impulses of the grains from step 0 [N s], shape (worlds, weighed walls, 3).
 
-        It is the sum over all steps of force times time step; 0 without a weighed wall.
+        Each is the sum over all steps of force times time step.
         """
-        counts = self.neighbours.pushed.numpy().reshape(self.layout.world_count, -1).sum(axis=1)
-        return np.asarray(counts * self._impulse_of_count)
+        layout = self.layout
+        by_grain = self.neighbours.pushed.numpy().reshape(
+            layout.world_count, layout.grain_count, layout.weighed_count, 3
+        )
+        return np.asarray(by_grain.sum(axis=1) * self._impulse_of_count[:, None, None])
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """Return the state of some worlds for their scenes, copied from the device."""
@@ -346,8 +361,9 @@ class Solver:
             positions,
             velocities[:, :, :3],
             velocities[:, :, 3],
-            self.impulses()[chosen].tolist(),
+            self.impulses()[chosen],
             *(each.tolist() for each in overviews(positions, velocities, alive)),
+            *([self.neighbours.lift.numpy()[chosen, 0].tolist()] if self.layout.has_free_wall else []),
         ]
         return [WorldView(*each) for each in zip(*numbers, strict=True)]
 

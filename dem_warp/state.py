@@ -11,7 +11,7 @@ from dem_warp.clumps import stack_spheres
 from dem_warp.laws.conventions import LawForms
 from dem_warp.laws.mechanism import Mechanisms
 from dem_warp.model import WorldSetup, shape_table
-from dem_warp.types import FRAMES, Precision, device_structs
+from dem_warp.types import FRAMES, Counts, Precision, device_structs
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,12 @@ class Layout:
     grain_count: int
     sphere_count: int
     wall_count: int
+    weighed_count: int
     pair_count: int
     mechanisms: Mechanisms
     has_mesh: bool
+    has_free_wall: bool
+    is_periodic: bool
     forms: LawForms
 
     @classmethod
@@ -32,10 +35,13 @@ class Layout:
         """Return the layout of all worlds; worlds with fewer grains are padded."""
         alike: dict[str, set[Any]] = {
             "number of walls": {len(world.walls) for world in worlds},
+            "number of weighed walls": {len(world.weighed) for world in worlds},
             "number of contacts": {len(world.contacts) for world in worlds},
             "mechanisms": {world.mechanisms for world in worlds},
             "forms of the contact law": {world.forms for world in worlds},
             "use of meshes": {world.triangle_count > 0 for world in worlds},
+            "use of free walls": {world.free_wall is not None for world in worlds},
+            "use of a period": {world.period is not None for world in worlds},
         }
         for name, found in alike.items():
             if len(found) > 1:
@@ -46,15 +52,25 @@ class Layout:
             max(world.grains.count for world in worlds),
             max(shape.sphere_count for world in worlds for shape in world.shapes),
             len(worlds[0].walls),
+            len(worlds[0].weighed),
             len(worlds[0].contacts),
             worlds[0].mechanisms,
             worlds[0].triangle_count > 0,
+            worlds[0].free_wall is not None,
+            worlds[0].period is not None,
             worlds[0].forms,
         )
 
     @property
     def grain_total(self) -> int:
         return self.world_count * self.grain_count
+
+    @property
+    def cell_bits(self) -> tuple[int, int, int]:
+        """Binary logarithms of the buckets of a world along x, y and z."""
+        bits = max(int(np.ceil(np.log2(2 * self.grain_count * self.sphere_count))), 6)
+        across = bits // 3
+        return across, across, bits - 2 * across
 
     @property
     def sphere_total(self) -> int:
@@ -93,7 +109,7 @@ def _wall_rows(worlds: Sequence[WorldSetup]) -> list[dict[str, Any]]:
             "pair": pair,
             "point": wall.point,
             "orientation": (0.0, 0.0, 0.0, 1.0),
-            "weighed": number == world.weighed,
+            "weighed": world.weighed.index(number) + 1 if number in world.weighed else 0,
         }
         for world in worlds
         for number, (wall, pair) in enumerate(world.walls)
@@ -120,10 +136,11 @@ def build_model(
             "time_step": world.time_step,
             "gravity": world.gravity,
             "rolling_holds": float(world.rolling_holds),
-            "unit": world.length_unit if precision.is_fixed_point else 1.0,
+            "unit": _unit_of(world, precision),
             "skin": world.skin,
             "reach": world.reach,
-            "cell_rate": _cell_rate(world, precision),
+            "cell_rate": _unit_of(world, precision) / world.cell,
+            **_period(world, precision, 2 ** layout.cell_bits[0]),
             "speed_limit": world.speed_limit,
             "drag_factor": np.exp(-world.air_drag * world.time_step),
             "force_rate": world.force_rate,
@@ -151,10 +168,18 @@ def build_model(
     return model
 
 
-def _cell_rate(world: WorldSetup, precision: Precision) -> float:
-    """Return the cells per count of a sphere position; a cell is as wide as a contact's reach and 1 %."""
-    unit = world.length_unit if precision.is_fixed_point else 1.0
-    return unit / (1.01 * (2 * world.largest_sphere + world.skin + world.reach))
+def _unit_of(world: WorldSetup, precision: Precision) -> float:
+    """Return the length of one count of a sphere position [m]."""
+    return world.length_unit if precision.is_fixed_point else 1.0
+
+
+def _period(world: WorldSetup, precision: Precision, most: int) -> dict[str, Any]:
+    """Return the period in counts of a sphere position, and its cells, `most` of them at most."""
+    if world.period is None:
+        return {}
+    counts = world.period / _unit_of(world, precision)
+    across = min(int(world.period / world.cell), most)
+    return {"period": round(counts) if precision.is_fixed_point else counts, "across": across}
 
 
 def _ints(
@@ -222,10 +247,13 @@ def build_neighbours(
     grains, worlds = layout.grain_total, layout.world_count
     slots, serial = grains * capacity, 0 if wp.get_device(device).is_cuda else grains
     neighbours.capacity = capacity
-    _clear(neighbours, grains, device, count=int, travel=real, pushed=wp.int64)
+    neighbours.weighed = layout.weighed_count
+    _clear(neighbours, grains, device, count=int, travel=real)
+    _clear(neighbours, grains * layout.weighed_count, device, pushed=Counts)
     # all zero is a displacement of zero, remembered at step 0: no history
     _clear(neighbours, slots, device, entry=int, history=precision.vec4)
     _clear(neighbours, slots * remembered, device, memory=real)
+    _clear(neighbours, worlds * layout.has_free_wall, device, borne=wp.int64, lift=wp.vec4d)
     _clear(neighbours, worlds, device, rebuilt=int)
     _clear(
         near, grains, device, count=int, speed=float, pace=float, path=real, travel=real, moves=int, afar=int
@@ -250,11 +278,9 @@ def build_cells(
 ) -> Any:
     """Return empty `Cells` of a batch, with capacities for partners of a sphere and entries of a list."""
     cells = device_structs(precision).Cells()
-    bits = max(int(np.ceil(np.log2(2 * layout.grain_count * layout.sphere_count))), 6)
-    across = bits // 3
-    cells.bits = wp.vec3i(across, across, bits - 2 * across)
+    cells.bits = wp.vec3i(*layout.cell_bits)
     spheres = layout.sphere_total
-    _clear(cells, layout.world_count << bits, device, bucket_size=int, bucket_start=int)
+    _clear(cells, layout.world_count << sum(layout.cell_bits), device, bucket_size=int, bucket_start=int)
     _clear(cells, layout.world_count, device, cursor=int)
     _clear(cells, spheres, device, bucket=int, rank=int, order=int, found_count=int, ordered=precision.sphere)
     _clear(cells, spheres * found_capacity, device, found=int)

@@ -72,7 +72,7 @@ def two_spheres(gap: float, *laws: Mechanism) -> WorldSetup:
         speed_limit=20.0,
         domain=((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)),
         gravity=(0.0, 0.0, 0.0),
-        weighed=1,
+        weighed=(1,),
     )
 
 

@@ -21,6 +21,10 @@ FRAMES = 128
 """Number of steps whose wall frames are stored: a power of two above the longest cycle."""
 
 
+Counts = wp.vec3l
+"""Type of a summed force, in counts along x, y and z."""
+
+
 class WorldFlag(IntFlag):
     """Failures of a world; 0: none."""
 
@@ -78,13 +82,21 @@ class Build:
     cooperative: bool
     mechanisms: Mechanisms = ()
     has_mesh: bool = False
+    has_free_wall: bool = False
+    is_periodic: bool = False
     forms: LawForms = BASE_FORMS
 
     @property
     def name(self) -> str:
         way = "warp" if self.cooperative else "serial"
         sizes = (self.sphere_count, self.wall_count)
-        extras = (*(m.name for m in self.mechanisms), *self.forms.changed, *("mesh",) * self.has_mesh)
+        extras = (
+            *(m.name for m in self.mechanisms),
+            *self.forms.changed,
+            *("mesh",) * self.has_mesh,
+            *("free",) * self.has_free_wall,
+        )
+        extras += ("periodic",) * self.is_periodic
         return "_".join(map(str, (self.precision.name, way, *sizes, *extras)))
 
     @property
@@ -115,6 +127,7 @@ def _with_fields(kinds: dict[str, Any]) -> Callable[[type], type]:
 def device_structs(precision: Precision) -> SimpleNamespace:
     """Return the structs in a precision by name."""
     real, vec3, vec4, sphere = precision.real, precision.vec3, precision.vec4, precision.sphere
+    count = int if precision.is_fixed_point else real
 
     @wp.struct
     @_with_fields(dict.fromkeys(parameters(), real))
@@ -151,9 +164,11 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         skin: real  # [m]
         reach: real  # largest distance of two surfaces that act on each other [m]
         cell_rate: real  # cells per count of a sphere position
+        period: count  # period along x and y in counts of a sphere position; 0 without one
+        across: int  # cells of a period
         speed_limit: real  # above it the world has diverged [m/s]
         drag_factor: real  # factor of the velocity by the air in a step; 1 without drag
-        force_rate: real  # counts of a force on the weighed wall [1/N]
+        force_rate: real  # counts of a force on a weighed wall [1/N]
         origin: wp.vec3d  # origin of sphere positions [m]
         half_extent: wp.vec3d  # half sides of the domain about the origin [m]
         found_limit: int  # most partners of a sphere; its own, so that no other world changes it
@@ -169,7 +184,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         length: wp.float64  # of the profile along the axis [m]
         reach: wp.float64  # from the wall's point to its farthest [m]
         start_step: int  # first step of the motion
-        weighed: int  # 1: the force of grains on it is summed up; 0: it is not
+        weighed: int  # its number among the walls whose forces are summed up, from 1; 0: it is none of them
         duration: wp.float64  # of the motion [s]
         point: wp.vec3d  # the wall's point at the start of the motion [m]
         orientation: wp.quatd  # its orientation then
@@ -177,6 +192,8 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         spin: wp.vec3d  # [rad/s]
         amplitude: wp.vec3d  # of the vibration [m]
         frequency: wp.float64  # [Hz]
+        mass: wp.float64  # of a wall that is free along z [kg]; 0 for the others
+        force: wp.float64  # on it along z, besides that of the grains [N]
 
     @wp.struct
     class Frame:
@@ -262,7 +279,14 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         rebuilt: wp.array(dtype=int)  # step of the last rebuild of all lists, (worlds,)
         # path of a grain's farthest point since the last search of its partners [m], (grains,)
         travel: wp.array(dtype=real)
-        pushed: wp.array(dtype=wp.int64)  # sum of its forces on the weighed wall, in counts, (grains,)
+        weighed: int  # weighed walls of a world
+        # sum of a grain's forces on each weighed wall, in counts, (grains * weighed walls,)
+        pushed: wp.array(dtype=Counts)
+        # of the free wall: force of the grains along z in this step, in counts, 0 between steps, (worlds,)
+        borne: wp.array(dtype=wp.int64)
+        # its rise [m] and speed [m/s] along z since the start of its motion; its path since the last rebuild
+        # of all lists, and the longest that the next check allows [m], (worlds,)
+        lift: wp.array(dtype=wp.vec4d)
         near: Near
         reactions: Reactions
 

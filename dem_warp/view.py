@@ -21,13 +21,15 @@ class WorldView:
     """Positions [m] and velocities [m/s], shape (n, 3)."""
     masses: np.ndarray
     """Masses [kg], shape (n,)."""
-    impulse: float
-    """Impulse of the grains on the weighed wall since the first step [N s]; see `Solver.impulses`."""
+    impulses: np.ndarray
+    """Impulses of the grains on the weighed walls since the first step [N s], shape (weighed walls, 3)."""
     rms_speed: float
     fastest: float
     """Root mean square and largest speed of the grains in the world [m/s]; 0 without grains."""
     highest: float
     """Height of the highest centre of a grain in the world [m]; minus infinity without grains."""
+    rise: float = 0.0
+    """Path of the free wall along z since the start of its motion [m]."""
 
 
 def overviews(

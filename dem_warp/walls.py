@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike
 from dem_warp.parameters import Parameter, check_parameters
 
 Vector = tuple[float, float, float]
+Triangles = tuple[tuple[float, ...], ...]
+"""Triangles of a surface [m]: the nine coordinates of the corners of each."""
 
 PLANE = 0
 CYLINDER = 1
@@ -38,6 +40,10 @@ class Motion:
     """Frequency of the vibration [Hz]."""
     duration: float = math.inf
     """Time after which the wall stays in place [s]. Default: the motion has no end."""
+    mass: float = 0.0
+    """Mass of a free wall, which the forces on it move along z, too, from rest [kg]; 0: it is not free."""
+    force: float = 0.0
+    """Force on a free wall along z besides that of the grains, its weight included [N]."""
 
     def __post_init__(self) -> None:
         for name in ("velocity", "spin", "amplitude"):
@@ -45,6 +51,10 @@ class Motion:
             if np.shape(value) != (3,) or not np.all(np.isfinite(value)):
                 raise ValueError(f"Motion.{name}: must be three finite numbers, got {value!r}")
         Parameter("Hz", at_least=0.0).check("Motion.frequency", self.frequency)
+        Parameter("kg", at_least=0.0).check("Motion.mass", self.mass)
+        Parameter("N").check("Motion.force", self.force)
+        if self.force and not self.mass:
+            raise ValueError(f"Motion.mass: must be positive with a force {self.force!r} N, got 0")
         if not self.duration > 0:
             raise ValueError(f"Motion.duration: must be positive [s], got {self.duration!r}")
         if any(self.amplitude) and self.frequency == 0:

@@ -19,7 +19,7 @@ from typer.main import get_command
 from dem_warp import SCENES
 from experiments.cli import app
 from experiments.discover.mechanism_files import FILES
-from experiments.studyfile.observables import OBSERVABLES, OUTLINE
+from experiments.studyfile.observables import OBSERVABLES, OUTLINE, READINGS
 from experiments.studyfile.reference import Row, study_reference
 
 
@@ -101,7 +101,7 @@ def observables_page() -> str:
             each.instrument.value if each.instrument else "",
             each.definition,
         )
-        for each in (*OBSERVABLES, *OUTLINE)
+        for each in (*OBSERVABLES, *READINGS, *OUTLINE)
     ]
     parts = [
         "# List of observables",

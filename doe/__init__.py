@@ -13,7 +13,7 @@ screened        screen, two_level_effects, steepest_path, climb_table
 fitted          fit_surface, fit_formula, fit_mixture; influence, box_cox, robust_coefficients
 best settings   canonical, ridge_path, stationary_region, maximize, minimize, most_desirable
 compared        compare_means, agreement, noise_floor, joint_fit, ProfileSample
-carried over    transfer, transfer_points
+carried over    transfer, transfer_points, spread_points
 
 ``doe.plots`` draws them.
 """

@@ -57,6 +57,7 @@ from .response.response_surface import Surface as Surface
 from .response.response_surface import fit_surface as fit_surface
 from .response.surface_points import StationaryPoint as StationaryPoint
 from .response.transfer import Transfer as Transfer
+from .response.transfer import spread_points as spread_points
 from .response.transfer import transfer as transfer
 from .response.transfer import transfer_points as transfer_points
 from .samples.agreement import Agreement as Agreement

@@ -1,4 +1,4 @@
-"""Whole runs as functions: calibration, search and bridge."""
+"""Whole runs as functions: calibration, plan of tests, search and bridge."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ require_own_packages()  # before the imports that a package of others under thes
 from experiments.runs.bridging import Bridge, BridgeOrder, prepare_bridge, run_bridge
 from experiments.runs.calibration import Calibration, StageHook, run_calibration
 from experiments.runs.choices import check_campaign, prepare
+from experiments.runs.fidelity import with_budget
+from experiments.runs.planning import TestPlan, prepare_plan, run_plan
 from experiments.runs.request import RunOptions, RunRequest
 from experiments.runs.search import SearchData, SearchResult, run_search
 from experiments.studyfile import Study
 
-__all__ = ["Bridge", "Calibration", "SearchResult", "bridge", "calibrate", "discover"]
+__all__ = ["Bridge", "Calibration", "SearchResult", "TestPlan", "bridge", "calibrate", "discover", "plan"]
 
 
 def calibrate(
     study: Study | str | Path | None = None,
     out: str | Path | None = None,
     *,
+    budget: str | None = None,
     on_stage: StageHook | None = None,
     **options: Unpack[RunOptions],
 ) -> Calibration:
@@ -34,6 +37,9 @@ def calibrate(
         A study, or its file; None: the paper's buckwheat.
     out
         Folder of the results, new or empty; None: ``out/NAME-SCALE``.
+    budget
+        Wall time with its unit, e.g. ``"30 min"``: the design is run at a cheaper scale of the study, and a
+        few runs move its surface to the scale that is asked for.
     on_stage
         Called with the name and the result of every finished stage.
     **options
@@ -45,7 +51,33 @@ def calibrate(
     InputError
         When study, device, engine or folder break a rule; nothing is written then.
     """
-    return run_calibration(prepare(study, RunRequest(out=out, **options), check_campaign), on_stage)
+    prepared = prepare(study, RunRequest(out=out, **options), check_campaign)
+    return run_calibration(prepared if budget is None else with_budget(prepared, budget), on_stage)
+
+
+def plan(
+    study: Study | str | Path,
+    out: str | Path | None = None,
+    *,
+    after: str | Path | None = None,
+    **options: Unpack[RunOptions],
+) -> TestPlan:
+    """Choose the next tests among the candidates of a study, and write the report into a folder.
+
+    Parameters
+    ----------
+    study, out, options
+        See `calibrate`; the folder is ``out/NAME-SCALE-plan``.
+    after
+        Folder of a finished campaign, or its card; None: the ranges of the factors are explored.
+
+    Raises
+    ------
+    InputError
+        When study, campaign, device, engine or folder break a rule; nothing is written then.
+    """
+    request = RunRequest(out=out, **options)
+    return run_plan(prepare_plan(study, request, None if after is None else Path(after)))
 
 
 def discover(

@@ -21,6 +21,7 @@ from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.heap import HEAP_EXAMPLE, heap
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import show_version
+from experiments.commands.plan import PLAN_EXAMPLE, plan
 from experiments.commands.reading import READING_EXAMPLE, reading
 from experiments.commands.streams import lasting_streams
 from experiments.commands.ui import UI_EXAMPLE, ui
@@ -48,6 +49,7 @@ def _options(
 
 
 app.command(epilog=CALIBRATE_EXAMPLE)(calibrate)
+app.command(epilog=PLAN_EXAMPLE)(plan)
 app.command(epilog=DISCOVER_EXAMPLE)(discover)
 app.command(epilog=HEAP_EXAMPLE)(heap)
 app.command(epilog=ANGLE_EXAMPLE)(angle)

@@ -1,10 +1,18 @@
 """The public names: each is loaded with its module when it is first used."""
 
-from .drawing.angle_overlay import overlay
+from .drawing.angle_overlay import overlay, overlay_drum
 from .drawing.render import Snapshot, silhouette, snapshot
 from .drawing.simulated_heap import HeapAngle, HeapOutlines, heap_angle, heap_outlines
+from .drum.drum_reading import DrumReading, read_drum
 from .flank.fit_settings import FITS, FitSettings
-from .flank.heap_shape import HeapShape, heap_profile, heap_shape, profile_heights
+from .flank.heap_shape import (
+    HeapReadings,
+    HeapShape,
+    heap_profile,
+    heap_readings,
+    heap_shape,
+    profile_heights,
+)
 from .flank.outline import Doubt, Outline
 from .photo.outline_finder import find_outline
 from .photo.picture_file import read_picture, save_picture
@@ -16,9 +24,11 @@ __all__ = [
     "FITS",
     "AngleDifference",
     "Doubt",
+    "DrumReading",
     "FitSettings",
     "HeapAngle",
     "HeapOutlines",
+    "HeapReadings",
     "HeapShape",
     "Outline",
     "PictureError",
@@ -30,11 +40,14 @@ __all__ = [
     "heap_angle",
     "heap_outlines",
     "heap_profile",
+    "heap_readings",
     "heap_shape",
     "measure",
     "measure_photograph",
     "overlay",
+    "overlay_drum",
     "profile_heights",
+    "read_drum",
     "read_picture",
     "save_picture",
     "silhouette",

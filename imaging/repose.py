@@ -10,19 +10,19 @@ from typing import Protocol
 import numpy as np
 from scipy import special
 
-from imaging.flank.camera_height import level_angle, level_error
+from imaging.flank.camera_height import camera_error, level_angle, level_error
 from imaging.flank.fit_settings import FitSettings
 from imaging.flank.flank_line import FlankLine, fit_flanks
 from imaging.flank.outline import Doubt, Outline
 from imaging.geometry import Picture
 from imaging.photo.doubts import doubts_of
 from imaging.photo.outline_finder import find_outline
-from imaging.photo.picture_file import focal_length, read_picture
+from imaging.photo.picture_file import focal_length, least_focal_length, read_picture
 from imaging.photo.view_settings import View
 from imaging.picture_error import PictureError
 
 LEAST_CORRECTION = 0.05
-"""Correction for the camera's height [degrees] that is mentioned: a digit of the drawn angles."""
+"""Correction for the camera's place [degrees] that is mentioned: a digit of the drawn angles."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,12 @@ class ReposeAngle:
 
     @property
     def left(self) -> float:
-        """Angle of the left flank [degrees], corrected for the camera's height."""
+        """Angle of the left flank [degrees], corrected for the camera's place."""
         return self._level(self.left_line.angle)
 
     @property
     def right(self) -> float:
-        """Angle of the right flank [degrees], corrected for the camera's height."""
+        """Angle of the right flank [degrees], corrected for the camera's place."""
         return self._level(self.right_line.angle)
 
     @property
@@ -57,32 +57,36 @@ class ReposeAngle:
 
     @property
     def correction(self) -> str:
-        """Correction for the camera's height in words; empty where it is less than 0.05 degrees."""
+        """Correction for the camera's place in words; empty where it is less than 0.05 degrees."""
         seen = self.left_line.angle, self.right_line.angle
         if max(abs(seen[0] - self.left), abs(seen[1] - self.right)) < LEAST_CORRECTION:
             return ""
         lines = f"lines seen at {seen[0]:.1f} and {seen[1]:.1f} degrees"
-        return f"{lines}, {self.left:.1f} and {self.right:.1f} corrected for the camera's height"
+        return f"{lines}, {self.left:.1f} and {self.right:.1f} corrected for the camera's place"
 
     @property
     def se(self) -> float:
-        """Standard error of the mean [degrees], from both lines and the camera's height."""
+        """Standard error of the mean [degrees], from both lines and the camera's place."""
+        return float(np.hypot(self._lines_se, camera_error(self._seen, self.outline, self._lines_se)))
+
+    @property
+    def _seen(self) -> float:
+        return 0.5 * (self.left_line.angle + self.right_line.angle)
+
+    @property
+    def _lines_se(self) -> float:
         roughness = 0.5 * float(np.hypot(self.left_line.se, self.right_line.se))
-        outline = self.outline
-        seen = 0.5 * (self.left_line.angle + self.right_line.angle)
-        return float(
-            np.hypot(roughness, level_error(seen, outline.elevation, outline.elevation_se, outline.distance))
-        )
+        return float(np.hypot(roughness, level_error(self._seen, self.outline)))
 
     def _level(self, seen: float) -> float:
-        return level_angle(seen, self.outline.elevation, self.outline.distance)
+        return level_angle(seen, self.outline.elevation, self.outline.likely_distance)
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:
         """Doubts about the angle; empty for a drawn silhouette."""
         if not self.outline.photographed:
             return ()
-        found = doubts_of(self.left_line, self.right_line, self.mean, self.se, self.outline)
+        found = doubts_of(self.left_line, self.right_line, self.mean, self._lines_se, self.outline)
         known = {doubt.name for doubt in self.outline.doubts}  # a tilt without a plate has a lower limit
         return (*self.outline.doubts, *(doubt for doubt in found if doubt.name not in known))
 
@@ -104,7 +108,7 @@ class ReposeAngle:
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Return the confidence interval of the mean [degrees]."""
-        return confidence_interval(self, level)
+        return confidence_interval(self.mean, self.se, self.dof, level)
 
 
 class Angle(Protocol):
@@ -167,13 +171,15 @@ def measure_photograph(
 ) -> ReposeAngle:
     """Measure the repose angle of the heap in a picture file; raise `PictureError` if it shows no heap.
 
-    The camera's distance follows from the focal length in the file, if there is one.
+    The camera's distance follows from the focal length in the file. Without one, a whole picture has a likely
+    distance, and its standard error holds all distances from that of the widest usual lens on.
     """
     settings = FitSettings.of(fit)
-    known = view or View()
+    known, picture = view or View(), read_picture(path)
     if known.focal_length is None:
-        known = replace(known, focal_length=focal_length(path))
-    return measure(read_picture(path), settings, place=str(path), view=known)
+        least = least_focal_length(picture.shape[:2])
+        known = replace(known, focal_length=focal_length(path), least_focal_length=least)
+    return measure(picture, settings, place=str(path), view=known)
 
 
 def compare(a: Angle, b: Angle) -> AngleDifference:
@@ -186,9 +192,9 @@ def compare(a: Angle, b: Angle) -> AngleDifference:
     return AngleDifference(a.mean - b.mean, float(np.hypot(a.se, b.se)))
 
 
-def confidence_interval(angle: Angle, level: float) -> tuple[float, float]:
+def confidence_interval(mean: float, se: float, dof: float, level: float) -> tuple[float, float]:
     """Return the interval that holds the true mean with probability `level` [degrees], by Student's t."""
     if not 0.0 < level < 1.0:
         raise PictureError("level", "must be between 0 and 1", level)
-    reach = float(special.stdtrit(angle.dof, 0.5 + 0.5 * level)) * angle.se
-    return angle.mean - reach, angle.mean + reach
+    reach = float(special.stdtrit(dof, 0.5 + 0.5 * level)) * se
+    return mean - reach, mean + reach

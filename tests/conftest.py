@@ -14,3 +14,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # thousands of modules and syntax trees stay to the end: looking through them again and again frees nothing
 gc.set_threshold(100_000, 50, 100)
+
+
+def pytest_collection_finish() -> None:
+    """Leave all that exists before the first test out of collections, also out of those of the product."""
+    gc.freeze()

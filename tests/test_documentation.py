@@ -191,6 +191,8 @@ def test_studies_load(block: Block, tmp_path: Path) -> None:
         text = text.replace("[contact.grain-grain]\nrestitution = 0.2\nrolling_friction = 0.05\n", "")
         if "factor" not in changes:
             text = re.sub(r"\[\[factor\]\].*?\n\n", "", text, flags=re.DOTALL)
+    if "grain-wall" in changes.get("contact", {}):
+        text = re.sub(r"\[contact\.grain-wall\].*?\n\n", "", text, flags=re.DOTALL)
     if any(key in changes.get("grain", {}) for key in ("clump", "shapes")):
         text = text.replace('sphere = "2 mm"\n', "")
     if "scene" in changes:

@@ -52,7 +52,7 @@ ADDITIONS = {
         "_ALL: Modules[type[Mechanism]] = Modules({", '"magnetism": "dem_warp.laws.magnetism:Magnetism", ',
     ),
     "scene": Addition("jar", (PLUGIN / "jar.py").read_text("utf-8"), "Jar",
-        "_ALL: tuple[type[PouredScene], ...] = (", "Jar, ",
+        "_ALL: tuple[type[WalledScene], ...] = (", "Jar, ",
     ),
     "mechanism": Addition(
         "magnetic_grains", (PLUGIN / "magnetic_grains.toml").read_text("utf-8"), "", "", ""
@@ -85,7 +85,7 @@ trial = pathlib.Path("experiments/studies/trial/study.toml")
 magnets, corners = {"magnetism": {"magnetic_force": "0.5 mN"}}, {"screening": {"design": "corners"}}
 study = load_study(trial, "bench", {"mechanism": magnets, "campaign": corners})
 paper = load_study(scale="bench")
-written = {key: value for key, value in paper.document.items() if key != "target"}  # no heap, no angle
+written = {key: value for key, value in paper.document.items() if key not in ("target", "response", "direct")}
 written |= {"scene": {"jar": {"diameter": "28 mm", "height": "28 mm"}}}
 jar = build_study(written, Places(paper.file, {}))
 app(["new", str(trial), "--measured"], standalone_mode=False)

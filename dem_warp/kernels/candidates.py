@@ -59,7 +59,7 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
     real = precision.real
     types = device_structs(precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
-    pack = packing(precision)
+    pack = packing(precision, build.is_periodic)
     contacts = contact_functions(build)
     walls = wall_functions(build.without_forces)
     spheres_each = wp.constant(build.sphere_count)
@@ -94,6 +94,37 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
         time = wp.float64(steps) * wp.float64(world.time_step)
         frame = walls.frame_of(model, index, grains.step[w])
         return real(walls.path(model.wall[index], frame, world, time))
+
+    @wp.func
+    def rise(model: Model, world: World, neighbours: Neighbours, w: int, i: int, steps: int) -> real:
+        """Return the longest path of a wall by the forces on it in some steps [m]; 0 if it is not free."""
+        longest = real(0.0)
+        if wp.static(build.has_free_wall):
+            wall = model.wall[w * walls_each + i]
+            if wall.mass > wp.float64(0.0):
+                time = wp.float64(steps) * wp.float64(world.time_step)
+                speed = wp.float64(HEADROOM) * wp.abs(neighbours.lift[w][1])
+                path = real((speed + wp.abs(wall.force) / wall.mass * time) * time)
+                longest = wp.clamp(path, real(LEAST_PATH) * world.skin, real(0.5) * world.skin)
+        return longest
+
+    @wp.func
+    def risen(neighbours: Neighbours, w: int) -> real:
+        """Return the path of the free wall since the last rebuild of all lists [m]; 0 without one."""
+        path = real(0.0)
+        if wp.static(build.has_free_wall):
+            path = real(neighbours.lift[w][2])
+        return path
+
+    @wp.func
+    def wall_speed(
+        model: Model, world: World, grains: Grains, neighbours: Neighbours, w: int, i: int
+    ) -> float:
+        """Return the speed of a wall [m/s]."""
+        speed = float(wall_path(model, world, grains, w, i, 1) / world.time_step)
+        if wp.static(build.has_free_wall):
+            speed += float(wp.abs(neighbours.lift[w][1]))
+        return speed
 
     @wp.func
     def waits(model: Model, grains: Grains, w: int, g: int) -> bool:
@@ -143,12 +174,13 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
             neighbours.near.wall_path[w] = real(0.0)
             neighbours.near.wall_speed[w] = 0.0
             for i in range(walls_each):
-                path = wall_path(model, world, grains, w, i, ahead)
+                further = rise(model, world, neighbours, w, i, ahead)
+                path = wall_path(model, world, grains, w, i, ahead) + further
                 neighbours.near.wall_path[w] = wp.max(neighbours.near.wall_path[w], path)
-                speed = float(wall_path(model, world, grains, w, i, 1) / world.time_step)
+                speed = wall_speed(model, world, grains, neighbours, w, i)
                 neighbours.near.wall_speed[w] = wp.max(neighbours.near.wall_speed[w], speed)
                 whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - neighbours.rebuilt[w])
-                if real(2.0) * whole > world.skin:
+                if real(2.0) * (whole + further + risen(neighbours, w)) > world.skin:
                     wp.atomic_max(stale, w, ALL)
                     any_stale[0] = 1
         neighbours.near.speed[g] = wp.max(speed_of(model, grains, g), float(KEPT) * neighbours.near.speed[g])
@@ -284,6 +316,13 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
             if g % model.grain_count == 0:
                 fastest[w] = 0.0
                 neighbours.near.top[w] = -wp.inf
+                if wp.static(build.has_free_wall):
+                    lift = neighbours.lift[w]
+                    before = wp.where(neighbours.rebuilt[w] == step, wp.float64(0.0), lift[2])
+                    allowed = before
+                    for i in range(walls_each):
+                        allowed += wp.float64(rise(model, world, neighbours, w, i, ahead))
+                    neighbours.lift[w] = wp.vec4d(lift[0], lift[1], before, allowed)
 
     @wp.kernel(module=module, grid_stride=False)
     def find_fastest(
@@ -323,9 +362,12 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
             if place == 0:
                 for i in range(walls_each):
                     whole = wall_path(model, world, grains, w, i, grains.step[w] - neighbours.rebuilt[w])
-                    if real(2.0) * whole > world.skin:
+                    if real(2.0) * (whole + risen(neighbours, w)) > world.skin:
                         wp.atomic_or(flags, w, LATE_REBUILD)
-                    speed = wp.max(speed, float(wall_path(model, world, grains, w, i, 1) / world.time_step))
+                    speed = wp.max(speed, wall_speed(model, world, grains, neighbours, w, i))
+                if wp.static(build.has_free_wall):
+                    if neighbours.lift[w][2] > neighbours.lift[w][3]:
+                        wp.atomic_or(flags, w, LATE_REBUILD)
         speed = largest_of_warp(speed)
         top = largest_of_warp(top)
         if thread % lanes == 0:

@@ -29,7 +29,7 @@ def cell_kernels(build: Build) -> SimpleNamespace:
     types = device_structs(precision)
     Model, World, Grains, Cells = types.Model, types.World, types.Grains, types.Cells
     Near = types.Near
-    pack = packing(precision)
+    pack = packing(precision, build.is_periodic)
     walls = wall_functions(build)
     triangles = triangle_functions(precision)
     spheres_each = wp.constant(build.sphere_count)
@@ -38,8 +38,22 @@ def cell_kernels(build: Build) -> SimpleNamespace:
     wp.set_module_options({"enable_backward": False}, module)
 
     @wp.func
+    def around(cell: int, world: World) -> int:
+        """Return the number along x or y of a cell, or of the one next to it; a period has numbers anew."""
+        if wp.static(build.is_periodic):
+            return (cell + world.across) % world.across
+        return cell
+
+    @wp.func
     def cell_of(a: precision.sphere, world: World) -> wp.vec3i:
         rate = world.cell_rate
+        if wp.static(build.is_periodic):
+            wide = real(world.across) / real(world.period)
+            return wp.vec3i(
+                around(int(wp.floor((real(a[0]) + real(0.5) * real(world.period)) * wide)), world),
+                around(int(wp.floor((real(a[1]) + real(0.5) * real(world.period)) * wide)), world),
+                int(wp.floor(real(a[2]) * rate)),
+            )
         return wp.vec3i(
             int(wp.floor(real(a[0]) * rate)),
             int(wp.floor(real(a[1]) * rate)),
@@ -178,7 +192,8 @@ def cell_kernels(build: Build) -> SimpleNamespace:
         c = cell_of(a, world)
         own = int(0)
         for n in range(wp.where(halved, OWN_CELL, 0), CELLS_AROUND):
-            b = bucket_of(c[0] + n % 3 - 1, c[1] + (n // 3) % 3 - 1, c[2] + n // 9 - 1, cells.bits, w)
+            x, y = around(c[0] + n % 3 - 1, world), around(c[1] + (n // 3) % 3 - 1, world)
+            b = bucket_of(x, y, c[2] + n // 9 - 1, cells.bits, w)
             begin = first + cells.bucket_start[b]
             end = begin + cells.bucket_size[b]
             if halved and n == OWN_CELL:

@@ -14,7 +14,7 @@ from dem_warp.kernels.lanes import load_pair
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
 from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size
-from dem_warp.types import Build, device_structs
+from dem_warp.types import Build, Counts, device_structs
 
 
 @functools.cache
@@ -26,7 +26,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     types = device_structs(precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     Contact = types.Contact
-    pack = packing(precision)
+    pack = packing(precision, build.is_periodic)
     law = contact_law(build.mechanisms, build.forms)
     is_apart = acts_apart(build.mechanisms)
     turning = build.forms.partner_turning
@@ -188,13 +188,22 @@ def contact_functions(build: Build) -> SimpleNamespace:
         pack.store_vec4(neighbours.reactions.torque, g, t - vec4(torque[0], torque[1], torque[2], real(0.0)))
 
     @wp.func
-    def weigh(model: Model, world: World, neighbours: Neighbours, wall: int, g: int, force: vec3):
-        """Add the opposite of a force to a grain's sum on the weighed wall.
+    def weigh(model: Model, world: World, neighbours: Neighbours, w: int, wall: int, g: int, force: vec3):
+        """Add the opposite of a force to a grain's sum on a weighed wall.
 
         Integer counts have the same sum in any order; one sum for all grains would be slow.
         """
-        if model.wall[wall].weighed != 0:
-            wp.atomic_add(neighbours.pushed, g, -wp.int64(wp.rint(force[2] * world.force_rate)))
+        number = model.wall[wall].weighed
+        if number != 0:
+            push = Counts(
+                -wp.int64(wp.rint(force[0] * world.force_rate)),
+                -wp.int64(wp.rint(force[1] * world.force_rate)),
+                -wp.int64(wp.rint(force[2] * world.force_rate)),
+            )
+            wp.atomic_add(neighbours.pushed, g * neighbours.weighed + number - 1, push)
+            if wp.static(build.has_free_wall):
+                if model.wall[wall].mass > wp.float64(0.0):
+                    wp.atomic_add(neighbours.borne, w, push[2])
 
     @wp.func
     def contact(
@@ -203,7 +212,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     ):  # fmt: skip
         """Return force [N], torque and rolling torque [N m] of an item of `near`, 0 without contact.
 
-        Update the history of the contact, the sum on the weighed wall and, on a CPU, the partner's reactions.
+        Update the history of the contact, the sum on a weighed wall and, on a CPU, the partner's reactions.
         """
         near = load_pair(neighbours.near.item, item)
         entry = near[0]
@@ -258,7 +267,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
             if meets:
                 pack.store_vec4(neighbours.history, slot, pack.stamp(displacement, step + 1))
                 if partner >= wall_base:
-                    weigh(model, world, neighbours, walls.wall_of(model, w, partner - wall_base), g, force)
+                    weigh(model, world, neighbours, w, walls.wall_of(model, w, partner - wall_base), g, force)
         if wp.static(is_speculative) and not meets:
             force = vec3()
             torque = vec3()

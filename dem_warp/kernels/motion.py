@@ -32,7 +32,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
     places, turns = wp.types.matrix((3, BLOCK), wp.float64), wp.types.matrix((4, BLOCK), wp.float64)
     types = device_structs(precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
-    pack = packing(precision)
+    pack = packing(precision, build.is_periodic)
     integration = integration_functions(precision)
     spheres_each = wp.constant(build.sphere_count)
 
@@ -77,11 +77,26 @@ def motion_functions(build: Build) -> SimpleNamespace:
         return velocity, turned, spin
 
     @wp.func
+    def within(world: World, place: wp.vec3d) -> wp.vec3d:
+        """Return the image of a place in the period about the origin."""
+        period = wp.float64(world.period) * wp.float64(world.unit)
+        for axis in range(2):
+            off = place[axis] - world.origin[axis]
+            if off + off >= period:
+                place[axis] = place[axis] - period
+            elif off + off < -period:
+                place[axis] = place[axis] + period
+        return place
+
+    @wp.func
     def moved(world: World, position: wp.vec3d, velocity: vec3) -> wp.vec3d:
         dt = world.time_step
-        return position + wp.vec3d(
+        place = position + wp.vec3d(
             wp.float64(velocity[0] * dt), wp.float64(velocity[1] * dt), wp.float64(velocity[2] * dt)
         )
+        if wp.static(build.is_periodic):
+            place = within(world, place)
+        return place
 
     @wp.func
     def fastest(velocity: vec3, spin: vec3, reach: real) -> real:

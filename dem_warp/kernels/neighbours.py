@@ -38,7 +38,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     types = device_structs(precision)
     Model, Grains, Neighbours, Cells = types.Model, types.Grains, types.Neighbours, types.Cells
     World = types.World
-    pack = packing(precision)
+    pack = packing(precision, build.is_periodic)
     contacts = contact_functions(build)
     spheres_each = wp.constant(build.sphere_count)
     bits = wp.constant(partner_bits(build.sphere_count))

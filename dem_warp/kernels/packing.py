@@ -6,6 +6,7 @@ its float32 radius, so that the difference of two positions is exact. In `double
 
 import functools
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
@@ -139,9 +140,27 @@ def _float_spheres(precision: Precision) -> SimpleNamespace:
     )
 
 
+def _nearest_image(precision: Precision) -> Any:
+    """Return the function of the difference of two spheres to the nearest image of the second."""
+    sphere, vec3, real = precision.sphere, precision.vec3, precision.real
+    World = device_structs(precision).World
+
+    @wp.func
+    def difference(a: sphere, b: sphere, world: World) -> vec3:
+        d = a - b
+        for axis in range(2):
+            if d[axis] + d[axis] > world.period:
+                d[axis] = d[axis] - world.period
+            elif d[axis] + d[axis] < -world.period:
+                d[axis] = d[axis] + world.period
+        return vec3(real(d[0]), real(d[1]), real(d[2])) * world.unit
+
+    return difference
+
+
 @functools.cache
-def packing(precision: Precision) -> SimpleNamespace:
-    """Return functions on packed spheres and histories in one precision.
+def packing(precision: Precision, is_periodic: bool = False) -> SimpleNamespace:
+    """Return functions on packed spheres and histories in one precision, in worlds with or without a period.
 
     `last` is the radius of a sphere or the size factor of a centre; `difference` and `place` are in metres.
     """
@@ -155,6 +174,8 @@ def packing(precision: Precision) -> SimpleNamespace:
         return world.origin + wp.vec3d(wp.float64(a[0]), wp.float64(a[1]), wp.float64(a[2])) * unit
 
     functions.place = place
+    if is_periodic:
+        functions.difference = _nearest_image(precision)
     short = precision.is_fixed_point
     functions.load_sphere, functions.store_sphere = _memory_access(
         sphere, "int" if short else "", "wp::int32"

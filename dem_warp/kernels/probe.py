@@ -19,7 +19,7 @@ def probe_kernels(build: Build) -> SimpleNamespace:
     types = device_structs(precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     Contact = types.Contact
-    pack = packing(precision)
+    pack = packing(precision, build.is_periodic)
     contacts = contact_functions(build)
     walls = wall_functions(build.without_forces)
     spheres_each = wp.constant(build.sphere_count)

@@ -18,7 +18,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
     precision = build.precision
     types = device_structs(precision)
     Model, Grains, Neighbours = types.Model, types.Grains, types.Neighbours
-    pack = packing(precision)
+    pack = packing(precision, build.is_periodic)
     motion = motion_functions(build)
     sum_contacts, add_contacts = cooperative_sum(build), serial_sum(build)
     prefetch_item, prefetch_turn, prefetch_place, prefetch_four = (

@@ -30,7 +30,7 @@ def serial_sum(build: Build):
     types = device_structs(build.precision)
     Model, Grains, Neighbours = types.Model, types.Grains, types.Neighbours
     contacts = contact_functions(build)
-    pack = packing(build.precision)
+    pack = packing(build.precision, build.is_periodic)
 
     @wp.func
     def add_contacts(model: Model, grains: Grains, neighbours: Neighbours, w: int, g: int, step: int):

@@ -205,11 +205,12 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
 @functools.cache
 def wall_kernels(build: Build) -> SimpleNamespace:
-    """Return `place_walls`, which computes the frames of the walls in the next steps."""
+    """Return `place_walls`, which computes the frames of walls in the next steps, and `carry`."""
     precision = build.precision
     real, vec3 = precision.real, precision.vec3
     types = device_structs(precision)
     Model, Wall, Frame, Grains = types.Model, types.Wall, types.Frame, types.Grains
+    World, Neighbours = types.World, types.Neighbours
     walls_each = wp.constant(build.wall_count)
     module = wp.get_module(f"dem_warp_walls_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
@@ -231,15 +232,49 @@ def wall_kernels(build: Build) -> SimpleNamespace:
             frame.spin = vec3(real(wall.spin[0]), real(wall.spin[1]), real(wall.spin[2]))
         return frame
 
+    @wp.func
+    def placed(wall: Wall, world: World, neighbours: Neighbours, w: int, step: int) -> Frame:
+        """Return the frame of a wall in a step: in closed form, but for the rise of a free one so far."""
+        frame = moved(wall, wp.float64(step - wall.start_step) * wp.float64(world.time_step))
+        if wp.static(build.is_periodic):
+            # it looks the same anywhere along x and y
+            frame.origin = wp.vec3d(wall.point[0], wall.point[1], frame.origin[2])
+        if wp.static(build.has_free_wall):
+            if wall.mass > wp.float64(0.0):
+                lift = neighbours.lift[w]
+                frame.origin += wp.vec3d(wp.float64(0.0), wp.float64(0.0), lift[0])
+                frame.velocity += vec3(real(0.0), real(0.0), real(lift[1]))
+        return frame
+
     @wp.kernel(module=module)
-    def place_walls(ahead: int, model: Model, grains: Grains):
-        """Set the frames of every wall in the present step and the `ahead` next, in closed form."""
+    def place_walls(ahead: int, model: Model, grains: Grains, neighbours: Neighbours):
+        """Set the frames of every wall in the present step and the `ahead` next."""
         i = wp.tid()
         index = i // (ahead + 1)
         w = index // walls_each
         wall = model.wall[index]
         step = grains.step[w] + i % (ahead + 1)
-        time = wp.float64(step - wall.start_step) * wp.float64(model.world[w].time_step)
-        model.frame[index * FRAMES + step % FRAMES] = moved(wall, time)
+        model.frame[index * FRAMES + step % FRAMES] = placed(wall, model.world[w], neighbours, w, step)
 
-    return SimpleNamespace(place_walls=place_walls, module=module)
+    @wp.kernel(module=module)
+    def carry(model: Model, idle: wp.array(dtype=int), grains: Grains, neighbours: Neighbours):
+        """Move the free wall of each world by the forces of a step, and set its frame in the next."""
+        w = wp.tid()
+        if idle[w] != 0:
+            return
+        world = model.world[w]
+        time_step = wp.float64(world.time_step)
+        for i in range(walls_each):
+            index = w * walls_each + i
+            wall = model.wall[index]
+            if wall.mass > wp.float64(0.0):
+                lift = neighbours.lift[w]
+                force = wall.force + wp.float64(neighbours.borne[w]) / wp.float64(world.force_rate)
+                speed = lift[1] + force / wall.mass * time_step
+                path = lift[2] + wp.abs(speed) * time_step
+                neighbours.lift[w] = wp.vec4d(lift[0] + speed * time_step, speed, path, lift[3])
+                step = grains.step[w]
+                model.frame[index * FRAMES + step % FRAMES] = placed(wall, world, neighbours, w, step)
+        neighbours.borne[w] = wp.int64(0)
+
+    return SimpleNamespace(place_walls=place_walls, carry=carry, module=module)

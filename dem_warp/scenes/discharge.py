@@ -10,7 +10,8 @@ import numpy as np
 from dem_warp.case import Case
 from dem_warp.model import WorldSetup
 from dem_warp.scenes.averages import mean_over_time
-from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
+from dem_warp.scenes.phases import UNREST, Phase
+from dem_warp.scenes.poured_controller import PouredController
 from dem_warp.scenes.scene import Decision, Observable, SceneState
 from dem_warp.scenes.surfaces import LEAST_POINTS, slope
 from dem_warp.view import WorldView

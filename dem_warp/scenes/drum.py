@@ -23,7 +23,8 @@ from dem_warp.scenes.drum_surface import (
     surface_angles,
     surface_heights,
 )
-from dem_warp.scenes.poured_controller import Phase, PouredController
+from dem_warp.scenes.phases import Phase
+from dem_warp.scenes.poured_controller import PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Decision, Observable, SceneState
@@ -224,7 +225,7 @@ class DrumController(PouredController[DrumState]):
         """Return True if the landed grains fill their part of the drum; a counted fill is never full."""
         if not self.scene.is_hatched:
             return super().is_full(view)
-        if self.poured.grain_count is not None:
+        if self.poured.is_counted:
             return False
         landed = view.alive & view.released & ~self._flying(view)
         return self._volume(view, landed) >= self.scene.volume

@@ -10,16 +10,18 @@ import numpy as np
 from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import GRAVITY, ContactCoefficients, WorldSetup
-from dem_warp.parameters import Parameter
-from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
+from dem_warp.parameters import LATER, Parameter
+from dem_warp.scenes.phases import UNREST, Phase
+from dem_warp.scenes.plates import check_lip, plate, rim
+from dem_warp.scenes.poured_controller import PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Decision, Observable, SceneState
 from dem_warp.scenes.surfaces import bed_level
 from dem_warp.view import WorldView
-from dem_warp.walls import Cylinder, Disc, Motion, Plane, Wall
+from dem_warp.walls import Cylinder, Motion, Wall
 
-PLATE, TUBE = 0, 1
+PLATE, TUBE, LIP = 0, 1, 2
 GONE = 1.5
 """Rise of the tube over its height at which grains that rose with it are removed."""
 
@@ -64,7 +66,8 @@ LIFT_OBSERVABLES = {
 class LiftedCylinder(PouredScene):
     """An open tube is filled by a rain of grains and lifted at constant speed along its axis.
 
-    A tilt turns plate and tube together: z is the axis of the tube, and gravity is turned about y.
+    A tilt turns plate and tube together: z is the axis of the tube, and gravity is turned about y. z = 0 is
+    the plate, or the rim of its lip.
     """
 
     diameter: Annotated[float, Parameter("m", above=0.0)]
@@ -78,7 +81,8 @@ class LiftedCylinder(PouredScene):
     duration: Annotated[float | None, Parameter("s", above=0.0)] = None
     """Simulated time at which the test ends. Default: at rest."""
     plate_diameter: Annotated[float | None, Parameter("m", above=0.0)] = None
-    """Diameter of a round plate; grains that fall over its rim are lost. Default: infinite."""
+    """Diameter of a round plate, a pedestal where it is the tube's; grains that fall over its rim are lost.
+    Default: infinite."""
     tilt: Annotated[float, Parameter("rad", at_least=0.0, below=math.pi / 2)] = 0.0
     """Tilt of plate and tube together from the beginning, downwards to +x."""
     plate_friction: Annotated[float | None, Parameter("1", at_least=0.0)] = None
@@ -91,21 +95,31 @@ class LiftedCylinder(PouredScene):
     """Frequency of the plate's vibration."""
     vibration_hold: Annotated[float, Parameter("s", at_least=0.0)] = 0.5
     """Time that the drive runs on after the tube has risen by its height, rounded up to a whole vibration."""
+    lip: Annotated[float, Parameter("m", at_least=0.0)] = field(default=0.0, metadata=LATER)
+    """Height of a rim around the plate, which keeps a layer of grains; the heap is what is above it."""
 
     name = "lifted-cylinder"
-    wall_names = ("plate", "tube")
     leaves_a_heap = True
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | LIFT_OBSERVABLES
-    part_names = (("plate",), ("tube",))
+    part_names = (("plate",), ("tube",), ("plate",))
     densest_fill = 0.58
-    floor = 0.0
-    weighed = TUBE
+    weighed = (TUBE,)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.plate_diameter is not None and not self.diameter < self.plate_diameter:
-            rule = f"must be above the tube's {self.diameter!r} [m]"
+        if self.plate_diameter is not None and not self.diameter <= self.plate_diameter:
+            rule = f"must be at least the tube's {self.diameter!r} [m]"
             raise ValueError(f"LiftedCylinder.plate_diameter: {rule}, got {self.plate_diameter!r}")
+        check_lip("LiftedCylinder", self.lip, self.height, self.plate_diameter, self.diameter)
+
+    @property
+    def wall_names(self) -> tuple[str, ...]:
+        """Names of the walls in films."""
+        return ("plate", "tube", "lip") if self.lip else ("plate", "tube")
+
+    @property
+    def floor(self) -> float:
+        return 0.0 - self.lip
 
     @property
     def gravity(self) -> tuple[float, float, float]:
@@ -130,32 +144,36 @@ class LiftedCylinder(PouredScene):
         """Motions of the walls during the lift."""
         motions = {TUBE: Motion(velocity=(0.0, 0.0, self.lift_speed))}
         if self.vibration_amplitude > 0:
-            motions[PLATE] = Motion(
+            shake = Motion(
                 amplitude=(0.0, 0.0, self.vibration_amplitude),
                 frequency=self.vibration_frequency,
                 duration=self.vibration_time,
             )
+            motions |= dict.fromkeys(self.shaken, shake)
         return motions
 
     @property
-    def plate(self) -> Plane | Disc:
-        """Plate below the tube, at z = 0."""
-        if self.plate_diameter is None:
-            return Plane()
-        return Disc((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), self.plate_diameter / 2)
+    def shaken(self) -> tuple[int, ...]:
+        """Walls that a vibration moves."""
+        return (PLATE, LIP) if self.lip else (PLATE,)
 
     @property
     def brim(self) -> float:
+        return self.height - self.lip
+
+    @property
+    def fall_height(self) -> float:
         return self.height
 
     def volume_below(self, height: float) -> float:
-        return np.pi / 4 * self.diameter**2 * height
+        return np.pi / 4 * self.diameter**2 * (height - self.floor)
 
     def cross_section(self, reach: float) -> CrossSection:
         return CrossSection.circle(self.diameter / 2)
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
-        return self.plate, Cylinder((0.0, 0.0, 0.0), self.diameter / 2, self.height)
+        tube = Cylinder((0.0, 0.0, self.floor), self.diameter / 2, self.height)
+        return plate(self.plate_diameter, self.floor), tube, *rim(self.plate_diameter, self.lip)
 
     def contacts(self, case: Case[Any]) -> tuple[ContactCoefficients, ...]:
         """Return the contacts of grains with grains, with the tube and with the plate."""
@@ -166,7 +184,7 @@ class LiftedCylinder(PouredScene):
         return grains, tube, replace(tube, static_friction=friction)
 
     def contact_of(self, wall: int) -> int:
-        return 2 if wall == PLATE else 1
+        return 1 if wall == TUBE else 2
 
     def check_parts(self, names: Sequence[str]) -> None:
         """Raise ValueError for an unknown part, or a plate with two frictions."""
@@ -178,7 +196,7 @@ class LiftedCylinder(PouredScene):
 
     def room(self, reach: float) -> tuple[float, float, float]:
         half_width = 4.0 * self.diameter + 2.0 * self.height
-        return half_width, half_width, -2 * reach
+        return half_width, half_width, self.floor - 2 * reach
 
     def controller(self, case: Case[Any], setup: WorldSetup, chunk: int) -> "LiftController":
         return LiftController(case, setup, chunk)
@@ -213,14 +231,16 @@ class LiftController(PouredController[LiftState]):
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
         self.state.mass = float(view.masses[kept].astype(float).sum())
         self.state.surface = [0.0, self.state.observables["fill_height"]]
-        self.state.first_impulse = view.impulse
-        self.state.last_impulse = [0.0, view.impulse]
+        self.state.first_impulse = pushed = float(view.impulses[0, 2])
+        self.state.last_impulse = [0.0, pushed]
         self.state.enter("lift", view)
         return self.scene.lift
 
     def _lift(self, view: WorldView) -> Decision:
         decision = self._lifted(view)
-        return replace(decision, move={PLATE: Motion()}) if self._vibration_ends(view) else decision
+        if not self._vibration_ends(view):
+            return decision
+        return replace(decision, move=dict.fromkeys(self.scene.shaken, Motion()))
 
     def _vibration_ends(self, view: WorldView) -> bool:
         """Return True if the vibration of the plate has ended since the last look."""
@@ -230,7 +250,7 @@ class LiftController(PouredController[LiftState]):
 
     def _lifted(self, view: WorldView) -> Decision:
         elapsed = view.time - self.state.phase_start
-        rise = self.scene.lift_speed * elapsed
+        rise = self.scene.floor + self.scene.lift_speed * elapsed
         top = view.highest + self.reach
         self._time_fall(view, elapsed)
         self._weigh_tube(view, elapsed, rise > top)
@@ -260,7 +280,7 @@ class LiftController(PouredController[LiftState]):
             return
         radius, (before, above) = self.scene.diameter / 2, self.state.surface
         inside = view.alive & (np.hypot(view.positions[:, 0], view.positions[:, 1]) < radius)
-        level = bed_level(view.positions[inside], (radius, radius), self.grain_reach)
+        level = bed_level(view.positions[inside], (radius, radius), self.grain_reach) - self.scene.floor
         for name, awaited_level in awaited.items():
             if level <= awaited_level:
                 seen[name] = before + (above - awaited_level) / (above - level) * (elapsed - before)
@@ -269,15 +289,14 @@ class LiftController(PouredController[LiftState]):
     def _weigh_tube(self, view: WorldView, elapsed: float, ends: bool) -> None:
         """Record the mean load of the tube until t75, or until it is clear."""
         seen, (before, carried) = self.state.observables, self.state.last_impulse
+        pushed = float(view.impulses[0, 2])
         if "wall_drag" in seen:
             return
         if ends or "t75" in seen:
             end = seen.get("t75", elapsed)
-            mean = (
-                np.interp(end, [before, elapsed], [carried, view.impulse]) - self.state.first_impulse
-            ) / end
+            mean = (np.interp(end, [before, elapsed], [carried, pushed]) - self.state.first_impulse) / end
             seen["wall_drag"] = float(mean / (self.state.mass * self.scene.gravity[2]))
-        self.state.last_impulse = [elapsed, view.impulse]
+        self.state.last_impulse = [elapsed, pushed]
 
     def _finish(self, view: WorldView, elapsed: float) -> None:
         state = self.state
@@ -297,4 +316,5 @@ class LiftController(PouredController[LiftState]):
         near = np.hypot(positions[:, 0], positions[:, 1]) <= ROLLED * self.scene.diameter / 2
         self.state.observables["rolled_fraction"] = 1.0 - float(masses[near].sum()) / self.state.mass
         if len(masses):
-            self.state.observables["centre_height"] = float(masses @ positions[:, 2] / masses.sum())
+            center = float(masses @ positions[:, 2] / masses.sum())
+            self.state.observables["centre_height"] = center - self.scene.floor

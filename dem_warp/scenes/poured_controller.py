@@ -1,13 +1,14 @@
 """Controllers of scenes that begin with a rain: filling, settling, and the measures of the fill."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from typing import Any, Generic, NamedTuple
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.model import WorldSetup
+from dem_warp.scenes.phases import UNREST, Phase, PhasedController
 from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.scenes.scene import Decision, StateT
 from dem_warp.scenes.surfaces import bed_level
@@ -17,69 +18,26 @@ from dem_warp.walls import Motion
 HEAPED = 4
 """Number of slow grains above the brim at which the container is full."""
 
-CALM = 10.0
-"""Largest speed of a resting grain over `rest_speed`, which limits the root mean square speed."""
 
-UNREST = (
-    "if grains tremble in place, lower time_step_fraction; grains that lose no energy (restitution 1, "
-    "friction 0) never rest"
-)
-"""Advice for grains that do not rest: with too long a step, damping adds energy."""
-
-
-class Phase(NamedTuple):
-    """Phase of a scene."""
-
-    look: Callable[[WorldView], Decision]
-    expected: float
-    """Approximate duration [s]."""
-
-
-class PouredController(ABC, Generic[StateT]):
+class PouredController(PhasedController[StateT]):
     """Controller that fills the container and lets the grains settle; the later phases are the scene's."""
-
-    LOOK = 4.0e-3
-    """Time between two looks [s], rounded up to a power of two times the chunk."""
 
     FILL_MARGIN, SETTLE_LIMIT = 2.0, 3.0
     """Longest time of filling after the rain, and of settling [s]."""
 
     def __init__(self, case: Case[Any], setup: WorldSetup, chunk: int, state: StateT) -> None:
-        self.case, self.setup = case, setup
+        super().__init__(case, setup, chunk, state)
         self.poured: PouredScene = case.scene
         self.reach = float(setup.bounding_radii.max())
-        self.grain_reach = case.grains.grain_reach
-        self.period = chunk * 2 ** max(int(np.ceil(np.log2(self.LOOK / (chunk * setup.time_step)))), 0)
         self.rain_end = float(setup.grains.release_steps.max() * setup.time_step)
         self.phases = {
             "fill": Phase(self._fill, self.rain_end + 0.1),
             "settle": Phase(self._settle, 0.2),
         }
-        self.state = state
 
     @abstractmethod
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
         """Enter the scene's first own phase with the resting grains `kept`; return the walls' motions."""
-
-    def fraction(self, time: float) -> float:
-        """Return roughly the fraction done at a simulated time [s], 0 to 1."""
-        expected = {name: phase.expected for name, phase in self.phases.items()}
-        done = sum(expected.get(phase["name"], 0.0) for phase in self.state.phases)
-        length = expected[self.state.phase]
-        return (done + min(time - self.state.phase_start, length)) / sum(expected.values())
-
-    def look(self, view: WorldView) -> Decision:
-        return self.phases[self.state.phase].look(view)
-
-    def rests(self, view: WorldView) -> bool:
-        """Return True if the grains have been slow for `rest_time`."""
-        limit = self.poured.rest_speed
-        if not (view.rms_speed < limit and view.fastest < CALM * limit):
-            self.state.slow_since = None
-            return False
-        if self.state.slow_since is None:
-            self.state.slow_since = view.time
-        return view.time - self.state.slow_since >= self.poured.rest_time
 
     def _fill(self, view: WorldView) -> Decision:
         if view.time > self.rain_end + self.FILL_MARGIN:
@@ -89,7 +47,7 @@ class PouredController(ABC, Generic[StateT]):
         if not (self.is_full(view) or (not awaited.any() and self.rests(view))):
             return Decision()
         self.state.enter("settle", view)
-        if self.poured.grain_count is not None:
+        if self.poured.is_counted:
             return Decision()
         return Decision(remove=np.flatnonzero(self.surplus(view) | awaited))
 
@@ -104,7 +62,7 @@ class PouredController(ABC, Generic[StateT]):
 
     def is_full(self, view: WorldView) -> bool:
         """Return True if slow grains lie above the brim; a counted fill is never full."""
-        if self.poured.grain_count is not None or view.highest <= self.poured.brim:
+        if self.poured.is_counted or view.highest <= self.poured.brim:
             return False
         above = view.alive & view.released & (view.positions[:, 2] > self.poured.brim)
         slow = np.linalg.norm(view.velocities[above], axis=1) < 0.5 * self.poured.rain_speed
@@ -117,7 +75,7 @@ class PouredController(ABC, Generic[StateT]):
         if not self.rests(view):
             return Decision()
         above = self.surplus(view)
-        if self.poured.grain_count is not None:
+        if self.poured.is_counted:
             above[:] = False
         kept = view.alive & ~above
         self._measure_fill(view, kept)

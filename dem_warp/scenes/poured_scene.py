@@ -1,23 +1,27 @@
 """Base of scenes that begin with a rain into a container: its settings and the initial world."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
 from dem_warp.case import Case
-from dem_warp.entries import max_partners
-from dem_warp.materials import WallPart
-from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
-from dem_warp.parameters import Parameter, check_parameters, require_choice
+from dem_warp.model import GRAVITY, Grains, WorldSetup
+from dem_warp.parameters import LATER, Parameter, check_parameters
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
-from dem_warp.scenes.scene import Controller, Observable
-from dem_warp.walls import Wall
+from dem_warp.scenes.scene import Observable
+from dem_warp.scenes.walled_scene import WalledScene, world_of
 
 FREEBOARD = 1.2
 """Largest fall of a grain over the height from the brim to the lowest wall."""
+
+RAIN_FRACTION = 0.1
+"""Solid fraction of a rain that finds its own rate: each grain still finds a free place at random."""
+
+Rate = Literal["given", "auto"]
+"""Sources of the rate of a rain."""
 
 FILL_OBSERVABLES = {
     "grain_count": Observable("1", "grains in the container after it was filled and levelled off"),
@@ -28,17 +32,9 @@ FILL_OBSERVABLES = {
 """Observables of every poured scene."""
 
 
-class TooManyGrainsError(ValueError):
-    """A scene needs more grains than a world can have."""
-
-    def __init__(self, scene: str, rule: str, count: float) -> None:
-        super().__init__(f"{scene}.grain_count: {rule}, got {count:.4g}")
-        self.rule, self.count = rule, count
-
-
 @dataclass(frozen=True, kw_only=True)
-class PouredScene(ABC):
-    """A container filled by a rain of grains; every subclass also has a `wall_material`."""
+class PouredScene(WalledScene):
+    """A container filled by a rain of grains."""
 
     rain_rate: Annotated[float, Parameter("1/s", above=0.0)] = 3000.0
     """Grains per second while filling."""
@@ -52,21 +48,19 @@ class PouredScene(ABC):
     """Time that the grains must stay below `rest_speed` to be at rest."""
     air_drag: Annotated[float, Parameter("1/s", at_least=0.0)] = 0.0
     """Rate at which still air slows a free grain of any size."""
+    rate: Rate = field(default="given", metadata=LATER)
+    """given: grains rain at `rain_rate`; auto: as fast as they find places in the cross-section, 10 % of the
+    rain's volume, at `rain_speed`."""
 
-    name: ClassVar[str]
-    """Name in study files."""
-    leaves_a_heap: ClassVar[bool] = False
-    """True if the test ends in a heap with a repose angle."""
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES
     densest_fill: ClassVar[float] = 0.64
     """Largest expected solid fraction of the poured bed, for the number of grains."""
-    part_names: ClassVar[tuple[tuple[str, ...], ...]] = ()
-    """Part names of each wall that may have its own material, from general to special; empty: no parts."""
-    weighed: ClassVar[int | None] = None
-    """Number of the wall whose impulse is summed up."""
 
     def __post_init__(self) -> None:
         check_parameters(self)
+        if self.rate == "auto" and self.rain_rate != PouredScene.rain_rate:
+            rule = 'needs rate = "given", as the rate is found from the cross-section'
+            raise ValueError(f"{type(self).__name__}.rain_rate: {rule}, got {self.rain_rate!r}")
 
     @property
     @abstractmethod
@@ -85,51 +79,6 @@ class PouredScene(ABC):
     @abstractmethod
     def cross_section(self, reach: float) -> CrossSection:
         """Return the opening for a rain of grains of a bounding radius [m]."""
-
-    @abstractmethod
-    def walls(self, reach: float) -> tuple[Wall, ...]:
-        """Return all walls, for grains of a bounding radius [m]."""
-
-    @abstractmethod
-    def room(self, reach: float) -> tuple[float, float, float]:
-        """Return half sides along x and y, and lowest height, of the space for grains [m]."""
-
-    @abstractmethod
-    def controller(self, case: Any, setup: WorldSetup, chunk: int) -> Controller[Any]:
-        """Return the controller of one case."""
-
-    @property
-    def gravity(self) -> tuple[float, float, float]:
-        """Gravity [m/s2]."""
-        return 0.0, 0.0, -GRAVITY
-
-    def contacts(self, case: Case[Any]) -> tuple[ContactCoefficients, ...]:
-        """Return the contacts of grains with grains, and with each kind of wall."""
-        return case.contacts(case.scene.wall_material)
-
-    def contact_of(self, wall: int) -> int:
-        """Return the index of the contact of a wall."""
-        return 1
-
-    def check_parts(self, names: Sequence[str]) -> None:
-        """Raise ValueError for a name that is no part of the walls."""
-        known = tuple(dict.fromkeys(name for wall in self.part_names for name in wall))
-        for name in names:
-            require_choice(f"{type(self).__name__}: part of the walls", name, known)
-
-    def surfaces(self, case: Case[Any], wall_count: int) -> tuple[tuple[ContactCoefficients, ...], list[int]]:
-        """Return the contacts of a case, with those of wall parts, and the contact index of each wall."""
-        contacts = self.contacts(case)
-        place = {part: len(contacts) + number for number, part in enumerate(case.wall_parts)}
-        parts = [self.part_of(case, wall) for wall in range(wall_count)]
-        holds = [self.contact_of(wall) if part is None else place[part] for wall, part in enumerate(parts)]
-        return (*contacts, *map(case.contact_with, case.wall_parts)), holds
-
-    def part_of(self, case: Case[Any], wall: int) -> WallPart | None:
-        """Return the part with its own material that a wall belongs to, by its most special name, or None."""
-        parts = {part.name: part for part in case.wall_parts}
-        names = self.part_names[wall] if parts and self.part_names else ()
-        return next((parts[name] for name in reversed(names) if name in parts), None)
 
     def release(self, reach: float) -> float:
         """Return the height from which grains fall freely [m]."""
@@ -155,18 +104,31 @@ class PouredScene(ABC):
         """Width of the outlet [m]; infinite for the whole container."""
         return np.inf
 
+    @property
+    def is_counted(self) -> bool:
+        """True if a number of grains is poured, which is never full."""
+        return self.grain_count is not None
+
+    def ordered(self, case: Case[Any]) -> int | None:
+        """Return the number of grains to pour, or None for as many as fill the container."""
+        return self.grain_count
+
+    def grains_per_second(self, case: Case[Any]) -> float:
+        """Return the rate of the rain [1/s]."""
+        if self.rate == "given":
+            return self.rain_rate
+        size = case.grains.size_mean
+        reach, mean_volume = size * case.grains.grain_reach, size**3 * case.grains.mean(lambda s: s.volume)
+        area = self.cross_section(reach).open_area(reach)
+        return RAIN_FRACTION * self.rain_speed * area / mean_volume
+
     def supply(self, case: Case[Any]) -> int:
         """Return the number of grains of the rain; raise TooManyGrainsError above the limit."""
         mean_volume = case.grains.mean(lambda shape: shape.volume)
-        count = self.grain_count or np.ceil(self.densest_fill * self.volume / mean_volume)
-        most = max_partners(case.grains.sphere_count) // case.grains.sphere_count
-        if not count <= most:
-            rule = f"must be at most {most:,} grains of {case.grains.sphere_count} spheres"
-            raise TooManyGrainsError(type(self).__name__, rule, float(count))
-        return int(count)
+        count = self.ordered(case) or np.ceil(self.densest_fill * self.volume / mean_volume)
+        return self.within_limit(case, float(count))
 
     def prepare(self, cases: Sequence[Case[Any]], device: Any) -> list[WorldSetup]:
-        """Return the initial worlds of cases of this kind of scene; sizes, grains and counts may differ."""
         scenes = [case.scene for case in cases]
         drawn = [case.grains.draw(case.scene.supply(case), case.seed) for case in cases]
         rains = place_rain(
@@ -176,37 +138,15 @@ class PouredScene(ABC):
                 scene.cross_section(float(grains.bounding_radii.max()))
                 for scene, grains in zip(scenes, drawn, strict=True)
             ],
-            [scene.rain_speed / scene.rain_rate for scene in scenes],
+            [case.scene.rain_speed / case.scene.grains_per_second(case) for case in cases],
             device,
         )
         return [_world(case, rain) for case, rain in zip(cases, rains, strict=True)]
 
 
 def _world(case: Case[Any], rain: Rain) -> WorldSetup:
-    scene = case.scene
     reach = rain.grains.bounding_radii.max()
-    grains = _falling(case, rain, scene.release(reach), reach)
-    half_x, half_y, bottom = scene.room(reach)
-    walls = scene.walls(reach)
-    contacts, holds = scene.surfaces(case, len(walls))
-    return WorldSetup(
-        grains=grains,
-        shapes=rain.grains.clumps,
-        contacts=contacts,
-        walls=tuple(zip(walls, holds, strict=True)),
-        time_step=case.time_step,
-        skin=case.numerics.skin or default_skin(case),
-        speed_limit=20 * scene.top_speed,
-        domain=(
-            (-half_x, -half_y, bottom),
-            (half_x, half_y, float(grains.positions[:, 2].max()) + 2 * reach),
-        ),
-        gravity=scene.gravity,
-        air_drag=scene.air_drag,
-        rolling_holds=case.laws.rolling != "own_spin_whole_step",
-        forms=case.laws.forms,
-        weighed=scene.weighed,
-    )
+    return world_of(case, _falling(case, rain, case.scene.release(reach), reach), rain.grains.clumps, reach)
 
 
 def _falling(case: Case[Any], rain: Rain, release: float, reach: float) -> Grains:
@@ -223,14 +163,3 @@ def _falling(case: Case[Any], rain: Rain, release: float, reach: float) -> Grain
         shapes=rain.grains.shapes,
         release_steps=np.ceil((positions[:, 2] - release) / (speed * case.time_step)).astype(int),
     )
-
-
-def default_skin(case: Case[Any]) -> float:
-    """Return a skin that keeps the lists short and the rebuilds rare [m]; it grows with the time step.
-
-    Two grains may each use up half of it within the shortest cycle, two steps. So it holds four steps of the
-    fastest grain, and an eighth more, up to three radii.
-    """
-    radius = case.grains.mean(lambda shape: float(shape.radii.mean())) * case.grains.size_mean
-    path = case.scene.top_speed * case.time_step
-    return float(np.clip(24.0 * path, 0.7 * radius, np.clip(4.5 * path, radius, 3.0 * radius)))

@@ -28,6 +28,11 @@ class CrossSection:
         """Return the cross-section of a tube of a radius [m]."""
         return cls((radius, radius), True)
 
+    def open_area(self, reach: float) -> float:
+        """Return the area for the centres of grains of a bounding radius [m2], at least a tenth of all."""
+        x, y = (max(half - reach, half / 3) for half in self.half_sides)
+        return x * y * (np.pi if self.is_round else 4.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Rain:
@@ -59,9 +64,7 @@ def place_rain(
     from dem_warp.kernels.lanes import WARP
     from dem_warp.kernels.rain import MAX_DELAYS, place_grains
 
-    orientations = [
-        _random_orientations(drawn.count, seed) for drawn, seed in zip(grains, seeds, strict=True)
-    ]
+    orientations = [random_orientations(drawn.count, seed) for drawn, seed in zip(grains, seeds, strict=True)]
     reaches = [float(drawn.bounding_radii.max()) for drawn in grains]
     first = np.cumsum([0, *(drawn.count for drawn in grains)])
     table = list(dict.fromkeys(clump for drawn in grains for clump in drawn.clumps))
@@ -101,7 +104,7 @@ def place_rain(
     return [Rain(*world) for world in zip(grains, placed, orientations, strict=True)]
 
 
-def _random_orientations(count: int, seed: int) -> np.ndarray:
+def random_orientations(count: int, seed: int) -> np.ndarray:
     """Draw uniformly distributed unit quaternions, (count, 4)."""
     q = np.random.default_rng([seed, 1]).normal(size=(count, 4))
     return q / np.linalg.norm(q, axis=1, keepdims=True)

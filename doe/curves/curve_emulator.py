@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from doe.errors import RuleError
-from doe.numerics.kriging import Kriging, fit_noisy_kriging
+from doe.numerics.kriging import Kriging, fit_kriging, fit_noisy_kriging
 from doe.numerics.one_thread import in_one_thread
 
 Array = NDArray[np.float64]
@@ -26,6 +26,12 @@ KEPT_VARIANCE = 0.999
 
 MOST_COMPONENTS = 6
 """Largest number of components."""
+
+NOISE_ROUNDS = 2
+"""Rounds in which a noise that varies and the kriging are found, each from the other."""
+
+GROWTH_SD, NEWTON_STEPS = 3.0, 30
+"""Prior standard deviation of the terms of the logarithm of that noise, and steps to find them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +49,19 @@ class CurveEmulator:
     processes: tuple[Kriging, ...]
     """Part of each score that the trend misses."""
     noises: Array
-    """Variance of the noise of one run in each score, shape (components,)."""
+    """Variance of the noise of one run in each score, at the middle of the settings, shape (components,)."""
     remainder: Array
     """Variance that the components leave out, shape (places,)."""
+    growth: Array
+    """Slopes of the logarithm of that noise with the settings and their products of two, 0 where it is the
+    same everywhere, shape (components, terms)."""
+    standard: Array
+    """Scores of each run as the others predict them, over the standard deviation that is expected, shape
+    (runs, components)."""
 
     @classmethod
     @in_one_thread
-    def of(cls, settings: ArrayLike, curves: ArrayLike) -> CurveEmulator:
+    def of(cls, settings: ArrayLike, curves: ArrayLike, varying: bool = False) -> CurveEmulator:
         """Fit an emulator.
 
         Parameters
@@ -58,6 +70,9 @@ class CurveEmulator:
             Coded settings of the runs, about -1 to +1, shape (runs, settings).
         curves
             Shape (runs, places).
+        varying
+            The noise of a run varies with the settings: its logarithm is a quadratic of them, by what each
+            run differs from the prediction of the others.
 
         Raises
         ------
@@ -81,16 +96,23 @@ class CurveEmulator:
         left = rows - mean - scores @ components
         basis = _with_constant(x)
         trends = np.linalg.lstsq(basis, scores, rcond=None)[0].T
-        fitted = [fit_noisy_kriging(x, miss) for miss in (scores - basis @ trends.T).T]
+        fitted = [_fitted(x, miss, varying) for miss in (scores - basis @ trends.T).T]
         return cls(
             mean,
             components,
             trends,
             np.asarray(np.linalg.pinv(basis.T @ basis), dtype=np.float64),
-            tuple(process for process, _ in fitted),
-            np.array([noise for _, noise in fitted]),
+            tuple(process for process, *_ in fitted),
+            np.array([noise for _, noise, _ in fitted]),
             left.var(axis=0),
+            np.array([growth for *_, growth in fitted]),
+            np.column_stack([process.standard for process, *_ in fitted]),
         )
+
+    def noise(self, settings: ArrayLike) -> Array:
+        """Return the noise variances of one run in the scores at coded settings, (points, components)."""
+        x = np.atleast_2d(np.asarray(settings, dtype=np.float64))
+        return np.asarray(self.noises * np.exp(_bent(x) @ self.growth.T))
 
     def scores(self, settings: ArrayLike) -> tuple[Array, Array]:
         """Return expected scores at coded settings and error variances, both (points, components)."""
@@ -112,6 +134,32 @@ class CurveEmulator:
         """Return the covariance at some places, given as numbers, for variances of the scores."""
         own = self.components[:, np.asarray(places)]
         return np.asarray(own.T * variances @ own + np.diag(self.remainder[np.asarray(places)]))
+
+
+def _fitted(x: Array, miss: Array, varying: bool) -> tuple[Kriging, float, Array]:
+    """Krige a score; return also its noise at the middle, and the terms of the noise's logarithm."""
+    process, noise = fit_noisy_kriging(x, miss)
+    terms = np.column_stack([np.ones(len(x)), _bent(x)])
+    log = np.append(np.log(noise), np.zeros(_bent(x).shape[1]))
+    for _ in range(NOISE_ROUNDS * varying):
+        log = _log_variance(terms, np.exp(terms @ log) * process.standard**2, log)
+        process = fit_kriging(x, miss, np.exp(terms @ log))
+    return process, float(np.exp(log[0])) if varying else noise, log[1:]
+
+
+def _log_variance(terms: Array, squares: Array, log: Array) -> Array:
+    """Fit the logarithm of a variance to squares: a penalised gamma likelihood, by Fisher scoring."""
+    penalty = np.diag([0.0, *[GROWTH_SD**-2] * (len(log) - 1)])
+    for _ in range(NEWTON_STEPS):
+        surplus = terms.T @ (squares / np.exp(terms @ log) - 1.0)
+        step = np.linalg.solve(0.5 * terms.T @ terms + penalty, 0.5 * surplus - penalty @ log)
+        log = log + np.clip(step, -1.0, 1.0)
+    return log
+
+
+def _bent(x: Array) -> Array:
+    """Return settings and their products of two, (points, terms)."""
+    return np.column_stack([x, *(x[:, i] * x[:, j] for i in range(x.shape[1]) for j in range(i + 1))])
 
 
 def _with_constant(x: Array) -> Array:

@@ -13,6 +13,7 @@ from doe.design.design import checked_setting, coded_points
 from doe.design.factors import Factor
 from doe.errors import DesignError
 from doe.response.response_surface import Surface
+from doe.response.transfer import Transfer
 from doe.screen.screened_effects import ScreenResult
 
 MOST_POINTS = 2_000
@@ -60,7 +61,7 @@ def normal_points(values: pd.Series) -> pd.DataFrame:
 
 
 def surface_grid(
-    surface: Surface,
+    surface: Surface | Transfer,
     x: str | None = None,
     y: str | None = None,
     at: Mapping[str, float] | None = None,
@@ -80,7 +81,8 @@ def surface_grid(
     resolution : int
         Points along each axis.
     """
-    design = checked_kind("surface", surface, Surface).design
+    fit = surface if isinstance(surface, Transfer) else checked_kind("surface", surface, Surface)
+    design = fit.design
     checked_number("extent", extent, above=0.0)
     resolution = checked_count("resolution", resolution, least=2, most=MOST_POINTS)
     if len(design.factors) < 2:

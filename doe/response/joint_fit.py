@@ -113,18 +113,14 @@ class JointFit:
         return float(np.count_nonzero(mask) / np.count_nonzero(self.explored))
 
     def level(self, point: Mapping[str, float] | None = None) -> float:
-        """Return the level of each response's test at which all of them together hold alpha, at a point.
-
-        It is found by drawing (``doe.samples.simultaneous``), with the errors as they are estimated there.
-        """
+        """Return the level of each response's test at which all together hold alpha at a point (drawn)."""
         first = self._first(tuple(self.goals), self._misfits_at(self._coded(point)))
         return float(self._together(tuple(self.goals)).levels(first)[0])
 
     @cached_property
     def coded_point(self) -> NDArray[np.float64]:
         """Setting with the smallest chi2; among several equally good, the one nearest to the centre."""
-        objective = sum(self._chi2(found) for found in self.misfits.values())
-        objective = objective + PULL * np.sum(self.cells**2, axis=1)
+        objective = sum(map(self._chi2, self.misfits.values())) + PULL * np.sum(self.cells**2, axis=1)
         order = np.argsort(np.where(self.explored, objective, np.inf), kind="stable")
         orthant = (self.cells[order] > 0.0) @ 2 ** np.arange(len(self.factors))
         _, best = np.unique(orthant, return_index=True)
@@ -211,6 +207,25 @@ class JointFit:
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
 
     @cached_property
+    def intervals(self) -> pd.DataFrame:
+        """Interval of each factor by itself: it holds the true value with a probability of 1 - alpha or more.
+
+        A value belongs when the smallest chi2 with it, the others free, is above the smallest of all by no
+        more than errors explain (``doe.samples.simultaneous``). ``region().ranges`` hold for all together.
+
+        Returns
+        -------
+        DataFrame, index ``factor``
+            value (of the smallest chi2), low, high, low_open, high_open (at an edge of what was explored).
+        """
+        rows = {}
+        for factor, unit in zip(self.factors, np.eye(len(self.factors)), strict=True):
+            found = self._region(self._near(unit))
+            ends, edges = found.ranges.loc[factor.name], found.open_ends.loc[factor.name]
+            rows[factor.name] = {"value": self.point[factor.name], **ends, **edges.add_suffix("_open")}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("factor")
+
+    @cached_property
     def directions(self) -> pd.DataFrame:
         """Directions of the factors by how well the responses together determine them, the best first.
 
@@ -221,32 +236,21 @@ class JointFit:
         Returns
         -------
         DataFrame, index ``direction`` from 1
-            A column for each factor (the unit vector, its largest component positive), half_width (coded;
-            infinite where no response changes), span (of the compatible region along it, over that of the
-            region explored; 0 where nothing is compatible).
-
-            The true setting is within half_width of the point along the direction with probability
-            1 - alpha (with 2 measurements of a target at least), where the surfaces are straight that far
-            (``doe.samples.simultaneous``).
+            A column for each factor (the unit vector, its largest component positive), span (of the
+            interval along it, made as those of the factors, over that of the region explored).
         """
-        names, every = tuple(self.goals), self._misfits_at(self.coded_point)
-        gradients = [goal.fit.quadratic_form.gradient(self.coded_point) for goal in self.goals.values()]
-        slopes = np.array(gradients) / np.array([[float(found[1][0])] for found in every.values()])
-        information = slopes.T @ slopes
-        values, vectors = np.linalg.eigh(information)
-        values, vectors = values[::-1], vectors[:, ::-1]
-        # rounding leaves eigenvalues of either sign where there is no information
-        values = np.where(values > 1e-12 * max(values[0], np.finfo(float).tiny), values, 0.0)
-        largest = np.abs(vectors).argmax(axis=0)
-        vectors = vectors * np.sign(vectors[largest, range(len(values))])
-        together, first = self._together(names), self._first(names, every)[0]
-        half_width = [
-            together.half_width(np.array(gradients), vector, first) if value > 0.0 else np.inf
-            for vector, value in zip(vectors.T, values, strict=True)
-        ]
-        index, mask = pd.RangeIndex(1, len(values) + 1, name="direction"), self._mask(names)
+        every = self._misfits_at(self.coded_point)
+        slopes = self._slopes / np.array([[float(found[1][0])] for found in every.values()])
+        vectors = np.linalg.eigh(slopes.T @ slopes)[1][:, ::-1]
+        vectors = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), range(len(vectors))])
+        index = pd.RangeIndex(1, len(vectors) + 1, name="direction")
         table = pd.DataFrame(vectors.T, columns=[factor.name for factor in self.factors], index=index)
-        return table.assign(half_width=half_width, span=[self._span(vector, mask) for vector in vectors.T])
+        return table.assign(span=[self._span(vector) for vector in vectors.T])
+
+    @cached_property
+    def _slopes(self) -> NDArray[np.float64]:
+        """Gradients of the fitted means at the smallest chi2, coded, shape (responses, factors)."""
+        return np.array([g.fit.quadratic_form.gradient(self.coded_point) for g in self.goals.values()])
 
     def _mask(self, names: tuple[str, ...]) -> NDArray[np.bool_]:
         """Return the cells where some responses agree, by their common level."""
@@ -280,7 +284,7 @@ class JointFit:
     @cached_property
     def _correlation(self) -> NDArray[np.float64]:
         """Correlation of the residuals of responses that were fitted to the same runs, else 0."""
-        fits = [goal.fit for goal in self.goals.values()]
+        fits = [unselected(getattr(goal.fit, "source", goal.fit)) for goal in self.goals.values()]
         matrix = np.eye(len(fits))
         for (i, one), (j, other) in combinations(enumerate(fits), 2):
             if isinstance(one, Surface) and isinstance(other, Surface) and one.points.equals(other.points):
@@ -303,16 +307,23 @@ class JointFit:
         table = pd.DataFrame(self.cells, columns=[factor.name for factor in self.factors])
         return Region(self.factors, table, mask, self.resolution, self.extent, self.explored)
 
-    def _span(self, direction: NDArray[np.float64], mask: NDArray[np.bool_]) -> float:
-        """Return the extent of a region's cells along a direction, over that of the region explored."""
+    def _span(self, direction: NDArray[np.float64]) -> float:
+        """Return the extent of the interval along a direction, over that of the region explored."""
         shadow = self.cells @ direction
-        belonging = shadow[mask]
-        return float(np.ptp(belonging) / np.ptp(shadow[self.explored])) if belonging.size else 0.0
+        return float(np.ptp(shadow[self._near(direction)]) / np.ptp(shadow[self.explored]))
+
+    def _near(self, direction: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return the cells whose chi2 exceeds the smallest by no more than errors explain, in a direction."""
+        first = self._first(tuple(self.goals), self._misfits_at(self.coded_point))[0]
+        added = self._together(tuple(self.goals)).added(self._slopes, direction, first)
+        near = self.explored & (sum(map(self._chi2, self.misfits.values())) <= self._smallest_chi2 + added)
+        near[np.linalg.norm(self.cells - self.coded_point, axis=1).argmin()] = True
+        return near
 
     def _order(self) -> Iterator[tuple[str, ...]]:
         """Yield the responses so far, from the first on, each time with the one that shrinks most."""
-        added, *left = self.goals
-        chosen: tuple[str, ...] = (added,)
+        first, *left = self.goals
+        chosen: tuple[str, ...] = (first,)
         yield chosen
         while left:
             best = min(left, key=lambda name: self.share(*chosen, name))
@@ -326,14 +337,14 @@ class JointFit:
 
     @property
     def _smallest_chi2(self) -> float:
-        return sum(float(self._chi2(found)[0]) for found in self._misfits_at(self.coded_point).values())
+        return self._objective(self.coded_point, pull=0.0)
 
     def _chi2(self, found: Misfit) -> NDArray[np.float64]:
         return (found[0] / found[1]) ** 2
 
-    def _objective(self, coded: NDArray[np.float64]) -> float:
-        chi2 = sum(float(self._chi2(goal.misfit(coded[None]))[0]) for goal in self.goals.values())
-        return chi2 + PULL * float(coded @ coded)
+    def _objective(self, coded: NDArray[np.float64], pull: float = PULL) -> float:
+        chi2 = sum(float(self._chi2(found)[0]) for found in self._misfits_at(coded).values())
+        return chi2 + pull * float(coded @ coded)
 
     def _refined(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the smallest chi2 of the region explored, searched from a cell, or that cell."""
@@ -379,10 +390,8 @@ def joint_fit(goals: Mapping[str, Goal], alpha: float = 0.05, resolution: int | 
     first, design = next(iter(designs.items()))
     for name, other in designs.items():
         if other.factors != design.factors:
-            raise DesignError(
-                f"responses must have the same factors: {first!r} has {design.factors}, {name!r} has "
-                f"{other.factors}"
-            )
+            rule = f"responses must have the same factors: {first!r} has {design.factors}, "
+            raise DesignError(f"{rule}{name!r} has {other.factors}")
     runs = np.vstack([other.points.to_numpy(dtype=np.float64) for other in designs.values()])
     extent = float(np.abs(runs).max())
     radius = float(np.linalg.norm(runs, axis=1).max()) * (1.0 + 1e-9)  # the farthest run itself is inside

@@ -121,7 +121,7 @@ class Surface:
         terms = ", ".join(map(term_name, self.terms)) or "the mean alone"
         return f"Surface in {terms}: {len(self.response)} observations, R2 {self.r2:.4f}"
 
-    @property
+    @cached_property
     def coded_coefficients(self) -> pd.Series:
         """Coefficients by term, in coded units; with blocks, the intercept is that of the average block."""
         return self.fit.params.iloc[: len(self.terms) + 1].copy()
@@ -239,7 +239,7 @@ class Surface:
         arguments.checked_level(alpha)
         surface = self
         while True:
-            p = surface.anova["p"]
+            p = surface.fit.pvalues  # of t, as of F in the analysis of variance, which takes longer
             free = [t for t in surface.terms if not any(contains(other, t) for other in surface.terms)]
             weakest = max(free, key=lambda term: p[term_name(term)], default=None)
             if weakest is None or not p[term_name(weakest)] > alpha:

@@ -1,4 +1,4 @@
-"""Several differences at once, each with two errors: the level of each, and intervals of linear estimates.
+"""Several differences at once, each with two errors: the level of each, and intervals of estimates.
 
 The smallest p value of k differences is below alpha / k with probability alpha at most (Bonferroni), less
 where the errors are correlated, as those of responses of the same runs are, and less where the rule of a
@@ -10,7 +10,7 @@ equal data give equal levels.
 
 import bisect
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -89,24 +89,32 @@ class Simultaneous:
             reach[:, column] = critical * np.sqrt(total[:, column])
         return reach
 
-    def half_width(self, slopes: FloatArray, direction: FloatArray, first: FloatArray) -> float:
-        """Return the half width of the interval of a linear combination of unknowns.
+    def added(self, slopes: FloatArray, direction: FloatArray, first: FloatArray) -> float:
+        """Return what the true value of a linear combination of unknowns adds to the smallest chi2.
 
-        The differences are slopes @ x plus their errors; x is estimated by least squares, each difference
-        weighed by its estimated variance. The interval holds direction @ x with probability 1 - alpha, for a
-        direction (unknowns,) in the span of the rows of the slopes (differences, unknowns).
+        More is added with probability alpha. The differences are slopes @ x plus their errors, chi2 weighs
+        each by its estimated variance, direction @ x is fixed and all else is free. Where the slopes
+        (differences, unknowns) say nothing of the direction (unknowns,), as if its variance were known.
+        An estimated correlation scatters: where it makes the errors cancel, independent errors count.
         """
-        # in coordinates of the slopes' span the normal equations have a solution for all weights
+        return max(each._added(slopes, direction, first) for each in (self, self._independent))
+
+    @cached_property
+    def _independent(self) -> "Simultaneous":
+        """The same with errors that are not correlated."""
+        return replace(self, correlation=np.eye(len(self.errors)))
+
+    def _added(self, slopes: FloatArray, direction: FloatArray, first: FloatArray) -> float:
         _, values, basis = np.linalg.svd(slopes, full_matrices=False)
         basis = basis[values > 1e-9 * values[0]]
-        inner, wanted = slopes @ basis.T, basis @ direction
+        wanted = basis @ direction
+        if not np.linalg.norm(wanted) > 1e-9:
+            return float(stats.chi2.ppf(1.0 - self.alpha, 1.0))
         difference, own, other = self._drawn(first, *INTERVAL_TAILS)
-        row = _weights(inner, wanted, np.einsum("bii->bi", own) + other)
-        error = (row * difference).sum(axis=1)
-        reach = np.quantile(np.abs(error) / np.sqrt(_variance(row, own, other)), 1.0 - self.alpha)
-        found = np.sqrt(np.outer(first, first)) * self.correlation
-        row = _weights(inner, wanted, (first + self.second)[None])
-        return float(reach * np.sqrt(_variance(row, found[None], self.second[None])[0]))
+        variance = np.einsum("bii->bi", own) + other
+        row = _weights(slopes @ basis.T, wanted, variance)
+        chi2 = (row * difference).sum(axis=1) ** 2 / (row**2 * variance).sum(axis=1)
+        return float(np.quantile(chi2, 1.0 - self.alpha))
 
     @property
     def _grid(self) -> FloatArray:
@@ -180,11 +188,6 @@ def _weights(slopes: FloatArray, direction: FloatArray, variance: FloatArray) ->
     information = np.einsum("bij,ik->bjk", weighted, slopes)
     solved = np.linalg.solve(information, np.tile(direction[:, None], (len(variance), 1, 1)))[..., 0]
     return np.asarray(np.einsum("bij,bj->bi", weighted, solved))
-
-
-def _variance(row: FloatArray, own: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the variance of weighted differences from the covariance of their first and second errors."""
-    return np.asarray(np.einsum("bi,bij,bj->b", row, own, row) + (row**2 * other).sum(axis=1))
 
 
 @cache

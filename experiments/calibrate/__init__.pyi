@@ -1,7 +1,8 @@
 """The public names: each is loaded with its module when it is first used."""
 
+from .campaign import Campaign
 from .cases import Runner, case_seed
-from .results import Campaign, ClimbEnd, Decision, Outcome
+from .results import ClimbEnd, Decision, Outcome
 from .stages import calibrate
 
 __all__ = [

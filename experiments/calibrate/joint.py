@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from doe import JointFit
+from doe import JointFit, Region
 from experiments.calibrate.direct_checks import DirectCheck, disagreement_text
 from experiments.calibrate.results import Decision
 from experiments.calibrate.values import fixed_values, p_text
@@ -36,6 +36,16 @@ def choose_jointly(joint: JointFit, settings: OptimumSettings) -> tuple[dict[str
     return joint.point, rule
 
 
+def ranges_of(region: Region, joint: JointFit | None) -> pd.DataFrame:
+    """Return the range of each factor, with the ends at an edge of what was explored.
+
+    With several responses that agree it is the interval of the factor by itself, else that of the region.
+    """
+    if joint is not None and region.mask.any():
+        return joint.intervals.drop(columns="value")
+    return region.ranges.join(region.open_ends.add_suffix("_open"))
+
+
 def joint_decisions(
     joint: JointFit, point: Mapping[str, float], settings: OptimumSettings
 ) -> tuple[Decision, ...]:
@@ -50,7 +60,7 @@ def open_directions(joint: JointFit, settings: OptimumSettings) -> pd.DataFrame:
 
 def direction_text(direction: pd.Series) -> str:
     """Write a direction by what it moves, as ``E up, F down (1 : 0.6)``."""
-    parts = direction.drop(["half_width", "span"])
+    parts = direction.drop("span")
     named = parts[parts.abs() >= SMALL_COMPONENT].sort_values(key=np.abs, ascending=False)
     moves = ", ".join(f"{name} {'up' if part > 0.0 else 'down'}" for name, part in named.items())
     if len(named) == 1:

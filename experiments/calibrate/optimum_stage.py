@@ -8,10 +8,10 @@ from contextlib import suppress
 import numpy as np
 import pandas as pd
 
-from doe import FactorSurface, Goal, JointFit, Region, Sample, Surface, TargetError, joint_fit
+from doe import FactorSurface, Goal, JointFit, Region, Sample, Surface, TargetError, Transfer, joint_fit
 from experiments.calibrate.cases import StageEnd, middle
 from experiments.calibrate.direct_checks import check_direct
-from experiments.calibrate.joint import choose_jointly, direct_decision, joint_decisions
+from experiments.calibrate.joint import choose_jointly, direct_decision, joint_decisions, ranges_of
 from experiments.calibrate.results import (
     Decision,
     FittedResponse,
@@ -41,10 +41,10 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
 
     StageEnd where the surface of a single response contradicts the target in all that the design explored.
     """
-    settings, fit, sample = study.campaign.optimum, surface.leading.reduced, target.leading
+    settings, fit, sample = study.campaign.optimum, surface.leading.final, target.leading
     reach = float(surface.design.coded.abs().to_numpy().max())
     response = study.target.leading
-    goals = {name: Goal(found.reduced, target.responses[name]) for name, found in surface.responses.items()}
+    goals = {name: Goal(found.final, target.responses[name]) for name, found in surface.responses.items()}
     goals |= {
         direct.name: Goal(FactorSurface(fit.design, direct.factor, direct.model_sd), direct.measured)
         for direct in study.direct
@@ -59,7 +59,8 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     else:
         (point, rule), region = choose_jointly(joint, settings), joint.region()
     prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
-    unidentified = _unidentified(settings, region)
+    ranges = ranges_of(region, joint)
+    unidentified = _unidentified(settings, region, ranges)
     truth = (
         None
         if target.truth is None
@@ -67,7 +68,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     )
     numbers = numbered_values("chosen", point)
     numbers |= {key_of("prediction", response): prediction["mean"]}
-    if surface.leading.reduced.dropped:
+    if fit.dropped:
         numbers |= {key_of("prediction of the full model", response): full_mean(prediction)}
     numbers |= {key_of("se of the fit", response): prediction["se"]}
     decisions = [
@@ -77,7 +78,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
             numbers,
             f"Chosen: {listed(point)}; the {_predicted(surface.leading, prediction, response)}.",
         ),
-        _region_decision(settings, region, unidentified, joint),
+        _region_decision(settings, region, ranges, unidentified, joint),
     ]
     if joint is not None:
         decisions += joint_decisions(joint, point, settings)
@@ -93,6 +94,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
         extent=region.extent,
         contour=fit.contour(sample.mean, region.extent),
         region=region,
+        ranges=ranges,
         unidentified=unidentified,
         truth=truth,
         decisions=tuple(decisions),
@@ -110,7 +112,7 @@ def _predicted(found: FittedResponse, prediction: pd.Series, response: Response)
     """Write what the surface predicts, with the model that each number comes from."""
     unit, mean = response.unit, quantity(prediction["mean"], response.unit)
     interval = interval_text((prediction["confidence_low"], prediction["confidence_high"]), unit)
-    if not found.reduced.dropped:
+    if not found.final.dropped:
         return f"surface of the {response.name} predicts {mean} ({interval})"
     full = f"the full one, whose errors count, {quantity(full_mean(prediction), unit)} ({interval})"
     return f"reduced surface of the {response.name} predicts {mean}; {full}"
@@ -120,7 +122,7 @@ def _choose(
     study: Study, surface: SurfaceResult, target: Sample, extents: list[float]
 ) -> tuple[dict[str, float], str]:
     """Return the chosen point, and the rule that chose it."""
-    fit = surface.leading.reduced
+    fit = surface.leading.final
     fixed = fixed_values(study.campaign.optimum.point, surface.center)
     if fixed is not None:
         return fixed, "The study fixes the chosen point."
@@ -157,7 +159,7 @@ def _radius(surface: SurfaceResult) -> float:
 
 
 def _closest(
-    fit: Surface, target: Sample, extent: float, radius: float, alpha: float
+    fit: Surface | Transfer, target: Sample, extent: float, radius: float, alpha: float
 ) -> dict[str, float] | None:
     """Return the compatible point among the runs whose fit is closest to the target, None where none is."""
     region = fit.compatible_region(target, alpha=alpha, extent=extent, radius=radius)
@@ -171,27 +173,30 @@ def _closest(
     return {str(name): float(value) for name, value in region.natural.iloc[best].items()}
 
 
-def _coded(fit: Surface, point: Mapping[str, float]) -> np.ndarray:
+def _coded(fit: Surface | Transfer, point: Mapping[str, float]) -> np.ndarray:
     return np.array([float(factor.to_coded(point[factor.name])) for factor in fit.design.factors])
 
 
-def _reach(fit: Surface, point: Mapping[str, float]) -> float:
+def _reach(fit: Surface | Transfer, point: Mapping[str, float]) -> float:
     """Return the largest coded coordinate of a point, by size."""
     return float(np.abs(_coded(fit, point)).max())
 
 
-def _unidentified(settings: OptimumSettings, region: Region) -> tuple[str, ...]:
-    """Return the factors whose compatible values span too much of the design's region."""
+def _unidentified(settings: OptimumSettings, region: Region, ranges: pd.DataFrame) -> tuple[str, ...]:
+    """Return the factors whose ranges span too much of the design's region."""
     if not region.mask.any():
         return ()
-    span = region.coded[region.mask].max() - region.coded[region.mask].min()
-    cell = 2.0 * region.extent / region.resolution
-    share = (span + cell) / (2.0 * region.extent)
+    explored = {factor.name: 2.0 * region.extent * factor.half_range for factor in region.factors}
+    share = (ranges["high"] - ranges["low"]) / pd.Series(explored)
     return tuple(str(name) for name in share.index[share > settings.unidentified_span])
 
 
 def _check_truth(
-    fit: Surface, target: TargetResult, confidence: float, reach: tuple[float, float], joint: JointFit | None
+    fit: Surface | Transfer,
+    target: TargetResult,
+    confidence: float,
+    reach: tuple[float, float],
+    joint: JointFit | None,
 ) -> TruthCheck:
     """Say where the hidden settings lie; factors that were not kept are at their middle in the fit."""
     truth, sample = target.truth or {}, target.leading
@@ -209,25 +214,33 @@ def _check_truth(
 
 
 def _region_decision(
-    settings: OptimumSettings, region: Region, unidentified: tuple[str, ...], joint: JointFit | None
+    settings: OptimumSettings,
+    region: Region,
+    ranges: pd.DataFrame,
+    unidentified: tuple[str, ...],
+    joint: JointFit | None,
 ) -> Decision:
     numbers = {"share of the region": region.fraction, "extent, coded": region.extent}
-    for name, ends in region.ranges.iterrows():
+    for name, ends in ranges.iterrows():
         numbers |= {f"low of {name}": ends["low"], f"high of {name}": ends["high"]}
     outcome = f"{region.fraction:.0%} of the design region is compatible with the target."
     if len(region.factors) > 1 and joint is None:
         outcome += " The target is one equation: the factors trade off along its contour."
-    ends = [f"{name} ({end})" for name, row in region.open_ends.iterrows() for end in row.index[row]]
+    opened = ranges[["low_open", "high_open"]].set_axis(["low", "high"], axis=1).astype(bool)
+    ends = [f"{name} ({end})" for name, row in opened.iterrows() for end in row.index[row]]
     if ends:
         outcome += f" Ranges that end at the edge of what was explored: {', '.join(ends)}."
     if unidentified:
         alone = "by this target alone" if joint is None else "by these responses"
         outcome += f" Not pinned down {alone}: {', '.join(unidentified)}."
-    of_each = "" if joint is None else " for each of the responses, the level shared among them"
+    of_each, its = "", "its compatible values span"
+    if joint is not None:
+        of_each = " for each of the responses, the level shared among them"
+        its = f"its interval ({settings.confidence:.0%}, the others free) spans"
     return Decision(
         STAGE,
         f"A setting is compatible when fit and target differ by no more than their errors together explain "
-        f"({settings.confidence:.0%}){of_each}; a factor is pinned down when its compatible values span at "
+        f"({settings.confidence:.0%}){of_each}; a factor is pinned down when {its} at "
         f"most {settings.unidentified_span:.0%} of the region.",
         numbers,
         outcome,

@@ -10,7 +10,7 @@ Results of a stage are in its ``responses``, by the name of the response and in 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -18,12 +18,12 @@ import numpy as np
 import pandas as pd
 
 from doe import Comparison, NoiseFloor, Sample
-from experiments.io.plain_data import indexed, jsonable
+from experiments.io.plain_data import indexed
 
 if TYPE_CHECKING:
-    from doe import Design, Factor, JointFit, Region, ScreenResult, Surface
+    from doe import Design, JointFit, Region, ScreenResult, Surface, Transfer
     from experiments.calibrate.direct_checks import DirectCheck
-    from experiments.studyfile.campaign import CampaignSettings, Direct, Response
+    from experiments.studyfile.campaign import Response
 
 Found = TypeVar("Found")
 
@@ -215,7 +215,20 @@ class FittedResponse:
     full: Surface
     """``full.design`` holds the cases that gave the response, a row each."""
     reduced: Surface
-    """The surface that the optimum is taken from."""
+    """The surface without the terms that show nothing."""
+    carried: Transfer | None = None
+    """The surface as it is at the study's own scale; None where the design was run there."""
+
+    @property
+    def final(self) -> Surface | Transfer:
+        """The surface that the optimum is taken from."""
+        return self.reduced if self.carried is None else self.carried
+
+    @property
+    def shown(self) -> tuple[pd.DataFrame, np.ndarray]:
+        """Natural settings and responses of the runs at the scale of that surface."""
+        of, there = self.full, self.carried
+        return (there.runs, there.response) if there else (of.design.natural, of.response)
 
 
 @dataclass(frozen=True)
@@ -241,6 +254,23 @@ class SurfaceResult(_ByResponse[FittedResponse]):
             "surface_anova_reduced": self._stacked(lambda found: found.reduced.anova),
             "surface_outside_ranges": self.outside,
         }
+
+
+@dataclass(frozen=True)
+class FidelityResult(_ByResponse["Transfer"]):
+    """The surfaces of a cheaper scale, moved to the study's own by some runs there."""
+
+    scale: str
+    """The cheaper scale."""
+    shifts: dict[str, float]
+    """Difference of the scales with every factor at its middle, by response; the climb's target was moved."""
+    cases: pd.DataFrame
+    """Runs at the study's own scale, those at the middle too."""
+    decisions: tuple[Decision, ...]
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the runs."""
+        return {"fidelity_runs": self.cases}
 
 
 @dataclass(frozen=True)
@@ -275,6 +305,8 @@ class OptimumResult(StageResult):
     """Points of the leading response's target contour in that box: a column a kept factor (index: piece)."""
     region: Region
     """Settings at which the fit and the target agree within their uncertainties, for all responses."""
+    ranges: pd.DataFrame
+    """Range of each factor: low, high, low_open, high_open (at an edge of what was explored)."""
     unidentified: tuple[str, ...]
     """Kept factors that the target does not pin down."""
     truth: TruthCheck | None
@@ -291,11 +323,8 @@ class OptimumResult(StageResult):
         return set(self.unidentified) == set(self.point)
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the contour, the compatible range of each factor and the joint fit."""
-        tables = {
-            "contour": self.contour,
-            "compatible_ranges": self.region.ranges.join(self.region.open_ends.add_suffix("_open")),
-        }
+        """Return the contour, the range of each factor and the joint fit."""
+        tables = {"contour": self.contour, "compatible_ranges": self.ranges}
         if self.joint is not None:
             tables["joint_responses"] = self.joint.tests(self.point)
             tables["joint_shrinkage"] = self.joint.shrinkage
@@ -318,75 +347,8 @@ class VerificationResult(_ByResponse[Comparison]):
         return {"verification": self.cases}
 
 
-STAGES = ("target", "noise_floor", "screening", "selection", "climb", "surface", "optimum", "verification")
-
-
-@dataclass(frozen=True)
-class Campaign:
-    """A calibration campaign; the stages after the one where it ended are None."""
-
-    factors: tuple[Factor, ...]
-    responses: tuple[Response, ...]
-    """Numbers to be matched; the first leads."""
-    settings: CampaignSettings
-    outcome: Outcome
-    reason: str
-    """The outcome as a sentence: what happened and, where it failed, what to change."""
-    cases: pd.DataFrame
-    """Every case, one row each, in the order of simulation."""
-    target: TargetResult | None = None
-    noise_floor: NoiseFloorResult | None = None
-    screening: ScreeningResult | None = None
-    selection: SelectionResult | None = None
-    climb: ClimbResult | None = None
-    surface: SurfaceResult | None = None
-    optimum: OptimumResult | None = None
-    verification: VerificationResult | None = None
-    direct: tuple[Direct, ...] = ()
-    """Factors that were measured by themselves."""
-
-    @property
-    def stages(self) -> dict[str, StageResult]:
-        """The stages that were reached, by name, in order."""
-        return {name: result for name in STAGES if (result := getattr(self, name)) is not None}
-
-    @property
-    def decisions(self) -> tuple[Decision, ...]:
-        """Every decision, in the order in which they were taken."""
-        return tuple(decision for result in self.stages.values() for decision in result.decisions)
-
-    @property
-    def failed_cases(self) -> pd.DataFrame:
-        """Cases that failed, or lack a response that their scene measures."""
-        return failed(self.cases, self.responses)
-
-    @property
-    def scene_costs(self) -> pd.DataFrame:
-        """Cost of every scene (index ``scene``): cases, simulated_time [s], grain_time [s].
-
-        The last is the simulated time of every grain together, to which the work is nearly proportional.
-        """
-        known = self.cases.reindex(columns=["scene", "simulated_time", "grain_count"])
-        known = known.assign(grain_time=known["simulated_time"] * known["grain_count"])
-        groups = known.groupby("scene", sort=False)
-        return groups[["simulated_time", "grain_time"]].sum().assign(cases=groups.size())
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain JSON data; numbers that are not finite are null."""
-        return {field.name: jsonable(getattr(self, field.name)) for field in fields(self)}
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return tables of every stage that was reached, for CSV files: a named index is a column."""
-        tables = {"cases": self.cases, "factors": pd.DataFrame([jsonable(f) for f in self.factors])}
-        for result in self.stages.values():
-            tables |= result.tables()
-        if len(self.scene_costs) > 1:
-            tables["scene_costs"] = self.scene_costs
-        tables["decisions"] = self._decision_table()
-        return {name: indexed(table) for name, table in tables.items()}
-
-    def _decision_table(self) -> pd.DataFrame:
-        columns = [field.name for field in fields(Decision)]
-        table = pd.DataFrame([jsonable(decision) for decision in self.decisions], columns=columns)
-        texts = ["; ".join(f"{name} = {value}" for name, value in each.items()) for each in table["numbers"]]
-        return table.assign(numbers=texts)
+STAGES = (
+    *("target", "noise_floor", "screening", "selection", "climb", "surface", "optimum", "verification"),
+    "fidelity",  # last, as seeds depend on the places
+)
+"""Names of the stages."""

@@ -7,7 +7,7 @@ import math
 import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, Self
@@ -18,7 +18,7 @@ from dem_warp import Case, CaseResult
 from dem_warp.checkpoint import case_name
 from dem_warp.result import OnProgress
 from experiments.cases.engines.engine import NO_ANSWER, Engine
-from experiments.cases.measuring import measuring_processes
+from experiments.cases.measuring import MeasuringThreads, measuring_processes
 from experiments.cases.store.outcome_table import Outcome, OutcomeTable
 from experiments.cases.store.store import Store
 from experiments.cases.workers.own import THIS_MACHINE
@@ -155,7 +155,7 @@ class CaseRunner:
         workers = self._workers
         if self._cases is None or (self._cases >= MANY and workers.leaves_cores):
             return measuring_processes(workers.helpers, self._measure, count)
-        return ThreadPoolExecutor(max_workers=workers.helpers)
+        return MeasuringThreads(workers.helpers)
 
 
 class _Numbers:

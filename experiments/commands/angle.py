@@ -12,7 +12,7 @@ import typer
 
 from experiments.commands.console import clear_errors, fail, plain, shown_count
 from experiments.commands.options import AsJson
-from experiments.commands.results import print_angles, print_findings
+from experiments.commands.results import DRUM_COLUMNS, HEAP_COLUMNS, print_angles, print_findings
 
 if TYPE_CHECKING:
     from experiments.measurement.photographs import PictureOptions
@@ -21,6 +21,27 @@ if TYPE_CHECKING:
 ANGLE_EXAMPLE = "Example: [bold]dem-warp angle photos/*.jpg --fit middle --overlay measured[/]"
 
 
+Crop = Annotated[str | None, typer.Option(metavar="X1,Y1,X2,Y2", help="Look at this part only.")]
+PlateLine = Annotated[
+    str | None, typer.Option(metavar="X1,Y1,X2,Y2", help="Two points (pixels) where heap and plate meet.")
+]
+HeapNumber = Annotated[
+    int | None, typer.Option("--heap", help="Number of the heap from the left, where there are several.")
+]
+Elevation = Annotated[float | None, typer.Option(help="Angle at which the camera looks down, in degrees.")]
+Distance = Annotated[
+    float | None, typer.Option(help="Distance of the camera from the heap, in widths of the heap.")
+]
+DrumCircle = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X,Y,R", help="Middle and radius (pixels) of the drum's inner edge. Default: found."
+    ),
+]
+DrumDiameter = Annotated[
+    str | None,
+    typer.Option(metavar="LENGTH", help='Inner diameter of the drum, e.g. "84 mm", for heights in metres.'),
+]
 HeapUnit = Annotated[
     str | None, typer.Option(help="Unit of length in files of spheres. Default: the file's own, or m.")
 ]
@@ -52,20 +73,14 @@ def angle(
         typer.Option(help="picture: one heap per picture; folder: one heap per folder."),
     ] = "picture",
     keep_doubtful: Annotated[bool, typer.Option(help="Count doubtful pictures in the mean.")] = False,
-    crop: Annotated[str | None, typer.Option(metavar="X1,Y1,X2,Y2", help="Look at this part only.")] = None,
-    plate: Annotated[
-        str | None,
-        typer.Option(metavar="X1,Y1,X2,Y2", help="Two points (pixels) where heap and plate meet."),
-    ] = None,
-    heap_number: Annotated[
-        int | None, typer.Option("--heap", help="Number of the heap from the left, where there are several.")
-    ] = None,
-    elevation: Annotated[
-        float | None, typer.Option(help="Angle at which the camera looks down, in degrees.")
-    ] = None,
-    distance: Annotated[
-        float | None, typer.Option(help="Distance of the camera from the heap, in widths of the heap.")
-    ] = None,
+    crop: Crop = None,
+    plate: PlateLine = None,
+    heap_number: HeapNumber = None,
+    elevation: Elevation = None,
+    distance: Distance = None,
+    drum: Annotated[bool, typer.Option("--drum", help="The pictures show a rotating drum.")] = False,
+    circle: DrumCircle = None,
+    diameter: DrumDiameter = None,
     unit: HeapUnit = None,
     plate_height: PlateHeight = None,
     types: GrainTypes = None,
@@ -87,6 +102,9 @@ def angle(
 
     Doubtful angles are marked, with the reason, and left out of the mean. Pictures in HEIC need
     pip install 'dem-warp\[heic]', or must be saved as JPEG. Heaps of spheres are viewed from eight sides.
+
+    With --drum the pictures show a rotating drum along its axis, level, one look or an average over time: the
+    result is the dynamic angle, the heights of the surface at nine places, and the filling.
     """
     with clear_errors():
         from experiments.measurement import photographs
@@ -94,9 +112,14 @@ def angle(
 
         pictures = photographs.expanded(pictures)
         _require_one_form({"--target": as_target, "--csv": as_csv, "--json": as_json})
-        view = _view(crop, plate, heap_number, elevation, distance)
+        of_heaps = {
+            "--plate": plate, "--heap": heap_number, "--elevation": elevation, "--distance": distance,
+            "--unit": unit, "--plate-height": plate_height, "--type": types,
+        }  # fmt: skip
+        _require_subject(drum, {"--circle": circle, "--diameter": diameter}, of_heaps)
+        view = _view(crop, plate, heap_number, elevation, distance, circle)
         heaps = heap_settings(unit, plate_height, types)
-        options = photographs.PictureOptions(fit, view, heaps, by, keep_doubtful)
+        options = photographs.PictureOptions(fit, view, heaps, by, keep_doubtful, drum, _length(diameter))
         if as_target:
             photographs.require_separate(pictures, options, "--target")
         with shown_count("pictures", len(pictures)) as watch:
@@ -122,7 +145,10 @@ def _print_mean(rows: Sequence[Mapping[str, Any]], options: PictureOptions, as_j
         result = {"pictures": rows, "mean": asdict(mean) if mean else None}
         typer.echo(json.dumps(result, allow_nan=False))
         return
-    print_angles(rows, options.fit)
+    if options.drum:
+        print_angles(rows, "Rotating drums, angles in degrees", DRUM_COLUMNS)
+    else:
+        print_angles(rows, f"Repose angles in degrees, {options.fit} fit", HEAP_COLUMNS)
     if mean:
         typer.echo(str(mean))
 
@@ -138,28 +164,57 @@ def _require_one_form(chosen: Mapping[str, bool]) -> None:
         raise InputError(given[1], problem, " ".join(given), "Each is the whole output.")
 
 
+def _require_subject(drum: bool, of_drums: Mapping[str, Any], of_heaps: Mapping[str, Any]) -> None:
+    """Refuse options of drums for heaps, and of heaps for drums."""
+    from experiments.io.errors import InputError
+
+    wrong = [option for option, value in (of_heaps if drum else of_drums).items() if value is not None]
+    if wrong:
+        raise InputError(
+            wrong[0], f"is an option of {'heaps, not of drums' if drum else 'drums: add --drum'}"
+        )
+
+
+def _length(text: str | None) -> float | None:
+    from experiments.io.errors import InputError
+    from experiments.io.units import read_quantity
+
+    length = None if text is None else read_quantity(text, "length", "--diameter")
+    if length is not None and not length > 0.0:
+        raise InputError("--diameter", "must be positive", text)
+    return length
+
+
 def _view(
-    crop: str | None, plate: str | None, heap: int | None, elevation: float | None, distance: float | None
+    crop: str | None,
+    plate: str | None,
+    heap: int | None,
+    elevation: float | None,
+    distance: float | None,
+    circle: str | None,
 ) -> View:
     from experiments.io.errors import InputError
     from imaging import View
 
-    corners = _four_numbers(crop, "--crop")
+    corners = _numbers(crop, "--crop", "four numbers X1,Y1,X2,Y2")
     if corners is not None and any(value != int(value) for value in corners):
         raise InputError("--crop", "must be whole pixels X1,Y1,X2,Y2", crop)
-    part = None if corners is None else (int(corners[0]), int(corners[1]), int(corners[2]), int(corners[3]))
-    return View(part, _four_numbers(plate, "--plate"), heap, elevation, distance)
+    part: Any = None if corners is None else tuple(map(int, corners))
+    line: Any = _numbers(plate, "--plate", "four numbers X1,Y1,X2,Y2")
+    ring: Any = _numbers(circle, "--circle", "three numbers X,Y,R")
+    return View(part, line, heap, elevation, distance, circle=ring)
 
 
-def _four_numbers(text: str | None, option: str) -> tuple[float, float, float, float] | None:
+def _numbers(text: str | None, option: str, form: str) -> tuple[float, ...] | None:
+    """Read numbers between commas, as many as the form has; None where they are not given."""
     from experiments.io.errors import InputError
 
     if text is None:
         return None
     try:
-        x1, y1, x2, y2 = (float(part) for part in text.split(","))
+        numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
-        x1 = y1 = x2 = y2 = float("nan")
-    if not all(abs(number) < float("inf") for number in (x1, y1, x2, y2)):
-        raise InputError(option, "must be four numbers X1,Y1,X2,Y2", text)
-    return x1, y1, x2, y2
+        numbers = ()
+    if len(numbers) != form.count(",") + 1 or not all(abs(number) < float("inf") for number in numbers):
+        raise InputError(option, f"must be {form}", text)
+    return numbers

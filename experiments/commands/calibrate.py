@@ -30,6 +30,14 @@ def calibrate(
             help="Write sheets of runs to simulate in another program, and wait for the results.",
         ),
     ] = False,
+    budget: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help='Wall time, such as "30 min": the design is run at a cheaper scale of the study, and a few '
+            "runs move its surface to the scale that is asked for.",
+        ),
+    ] = None,
     as_json: AsJson = False,
     *,
     asked: RunRequest,
@@ -40,16 +48,24 @@ def calibrate(
 
         asked = replace(asked, engine="hand") if by_hand else asked
         prepared = prepare(study, asked, check_campaign)
+        if budget is not None:
+            from experiments.runs.fidelity import with_budget
+
+            prepared = with_budget(prepared, budget)
         if dry_run:
             from experiments.runs.plan import plan_calibration
 
             show_plan(plan_calibration(prepared), as_json)
-    advice = Attempt.of("calibrate", study, **options_of(prepared), live=live, json=as_json)
+    advice = Attempt.of("calibrate", study, **options_of(prepared), live=live, budget=budget, json=as_json)
     with clear_errors(advice), live_page(prepared.folder, live, messages.print):
         from experiments.runs.calibration import run_calibration
         from experiments.runs.request import AwaitingRuns
 
         print_study(prepared.study, prepared.resources)
+        if fidelity := prepared.study.campaign.fidelity:
+            messages.print(
+                f"The design at the scale {fidelity.scale}, {fidelity.runs} runs at the study's own."
+            )
         try:
             ended = run_calibration(prepared, show_stage)
         except AwaitingRuns as waiting:

@@ -66,8 +66,8 @@ def heap(
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView, OVITO), angle.json, and snapshot.png with the fitted flanks.
 
-    snapshot-clean.png is the same picture without them, to be shown or measured again. A study of a hopper, a
-    drum or a draw-down gives what that test measures instead of the angle; so does --scene with a further
+    snapshot-clean.png is the same picture without them, to be shown or measured again. A test that leaves no
+    heap, e.g. a drum or a ledge, gives what it measures instead of the angle; so does --scene with a further
     scene of the study.
     """
     with clear_errors():

@@ -20,6 +20,13 @@ def new(
             "--measured", help="Write NAME-measured.csv instead: room for heaps measured for the study NAME."
         ),
     ] = False,
+    test: Annotated[
+        str,
+        typer.Option(
+            metavar="TEST",
+            help="Test of the study, e.g. poured-heap, ledge, compression, shear, penetration, drum or drop.",
+        ),
+    ] = "lifted-cylinder",
 ) -> None:
     """Write a commented study file to start from, or a file for the measured heaps of a study."""
     with clear_errors():
@@ -32,6 +39,6 @@ def new(
         else:
             from experiments.studyfile import write_template
 
-            path, words = write_template(name), ["calibrate"]
+            path, words = write_template(name, test=test), ["calibrate"]
     then = shell_line(["dem-warp", *words, str(path)])
     typer.echo(plain(f"Wrote {path}. Fill it in, then: {then}"))

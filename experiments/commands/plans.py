@@ -12,7 +12,7 @@ from rich.table import Table
 from experiments.commands.console import duration, plain
 
 if TYPE_CHECKING:
-    from experiments.runs.plan import Plan
+    from experiments.runs.plan import Plan, PlannedBatch
 
 
 def show_plan(plan: Plan, as_json: bool) -> NoReturn:
@@ -28,6 +28,9 @@ def show_plan(plan: Plan, as_json: bool) -> NoReturn:
         numbers = (f"{number:,}" for number in (batch.cases, batch.most, batch.grains, batch.steps))
         table.add_row(batch.name, *numbers, _time(batch.seconds))
     Console(markup=False).print(table)
+    for batch in plan.batches:
+        if batch.phases:
+            typer.echo(plain(f"Phases of {batch.name}: {_phases(batch)}."))
     for doubt in plan.doubts:
         typer.echo(plain(f"Doubtful: {doubt}"))
     seconds, source = totals["seconds"], totals["source"]
@@ -38,6 +41,16 @@ def show_plan(plan: Plan, as_json: bool) -> NoReturn:
     typer.echo(f"Memory {what}: {_bytes(plan.memory)}. Disk: at most {_bytes(plan.disk)}.")
     typer.echo("Nothing was run, nothing was written.")
     raise typer.Exit
+
+
+def _phases(batch: PlannedBatch) -> str:
+    """Say how many steps each phase takes, its part of all, and its time where it is known."""
+    parts = []
+    for name, steps in batch.phases.items():
+        part = steps / sum(batch.phases.values())
+        time = "" if batch.seconds is None else f", {duration(part * batch.seconds)}"
+        parts.append(f"{name} {steps:,} steps ({part:.0%}{time})")
+    return "; ".join(parts)
 
 
 def _time(seconds: float | None) -> str:

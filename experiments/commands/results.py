@@ -77,16 +77,23 @@ def print_measured(simulated: Heap) -> None:
         typer.echo(f"filling: {filling_text(scene, simulated.filling)}")
 
 
-def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
+HEAP_COLUMNS = {"left": "left", "right": "right", "mean": "mean", "se": "se"}
+DRUM_COLUMNS = {
+    "mean": "dynamic angle", "se": "se", "upper_angle": "upper", "lower_angle": "lower", "filling": "filling",
+}  # fmt: skip
+"""Columns of measured pictures, and their heads."""
+
+
+def print_angles(rows: Sequence[Mapping[str, Any]], title: str, columns: Mapping[str, str]) -> None:
     """Lay out measured pictures as a table, with their doubts."""
-    table = Table(title=f"Repose angles in degrees, {fit} fit")
+    table = Table(title=title)
     table.add_column("picture", overflow="fold")
-    for name in ("left", "right", "mean", "se"):
-        table.add_column(name, justify="right")
+    for head in columns.values():
+        table.add_column(head, justify="right")
     table.add_column("doubts", overflow="fold")
     for row in rows:
         if row["mean"] is not None:
-            values = [f"{row[name]:.2f}" for name in ("left", "right", "mean", "se")]
+            values = ["" if row[name] is None else f"{row[name]:.2f}" for name in columns]
             doubts = ", ".join(doubt.partition(":")[0] for doubt in row["doubts"])
             table.add_row(Text(plain(row["picture"])), *values, doubts)
     if table.row_count:
@@ -97,7 +104,7 @@ def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
 def print_findings(rows: Sequence[Mapping[str, Any]]) -> None:
     """Print how heap files were read, and why angles are doubtful."""
     for row in rows:
-        if row["mean"] is not None and row["source"] != "photograph":
+        if row["mean"] is not None and row["source"] not in ("photograph", "drum"):
             messages.print(f"Read: {row['picture']}: {row['source']}")
         if row["correction"]:
             messages.print(f"Corrected: {row['picture']}: {row['correction']}")

@@ -36,7 +36,8 @@ from experiments.studyfile import Study
 from experiments.studyfile.mechanism_factor import MechanismFactor
 
 WITHOUT_EFFECT = (
-    "name", "note", "companion", "target", "response", "direct", "campaign", "discover", "factor", "engine",
+    "name", "note", "companion", "target", "response", "direct", "candidate", "campaign", "discover",
+    "factor", "engine",
 )  # fmt: skip
 """Keys of a study that change no heap at given factors; of its engine, the identity does."""
 

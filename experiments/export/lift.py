@@ -10,7 +10,7 @@ import numpy as np
 
 from dem_warp import Case, ClumpShape, LiftedCylinder
 from dem_warp.scenes.lifted_cylinder import LiftController
-from dem_warp.scenes.poured_controller import CALM
+from dem_warp.scenes.phases import CALM
 from experiments.export.exporter import ExportedTest
 from experiments.export.sizes import classes_of
 from experiments.io.errors import InputError
@@ -81,6 +81,9 @@ class Lift:
         if not isinstance(scene, LiftedCylinder):
             rule = "the test must be a lifted-cylinder: no other is exported"
             raise InputError(self.test.source, rule, getattr(scene, "name", type(scene).__name__))
+        if scene.lip > 0.0:
+            rule = "the plate must have no lip: no code is given one"
+            raise InputError(self.test.source, rule, f"lip = {scene.lip:g} m")
 
     @property
     def case(self) -> Case[LiftedCylinder]:
@@ -162,11 +165,16 @@ class Lift:
         return self.rain_height / self.scene.rain_speed
 
     @property
+    def given_rate(self) -> float:
+        """Grains a second in the scene."""
+        return self.scene.grains_per_second(self.case)
+
+    @property
     def rain_rate(self) -> float:
         """Grains a second: the scene's, or the most that find a place."""
         volume = self.case.grains.mean(lambda shape: shape.volume)
         area = math.pi * max(self.rain_radius - self.reach, 0.3 * self.rain_radius) ** 2
-        return min(self.scene.rain_rate, RAIN_DENSITY * self.scene.rain_speed * area / volume)
+        return min(self.given_rate, RAIN_DENSITY * self.scene.rain_speed * area / volume)
 
     @property
     def fill_limit(self) -> float:

@@ -16,13 +16,13 @@ def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
     sizes = sizes_text(case.grains)
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
     rate = f"{lift.rain_rate:.4g} grains a second, {scene.rain_speed:g} m/s"
-    slower = "" if lift.rain_rate == scene.rain_rate else _slower(lift)
+    slower = "" if lift.rain_rate == lift.given_rate else _slower(lift)
     prism = f"prism of {SIDES} sides that touch it from outside"
     return (
         Translated("shear modulus of the grains", f"{shear:.6g} Pa", f"{softening}; calibrated so, keep it"),
         Translated("sizes", sizes, f"{len(lift.templates)} templates: mean, variance and mean mass the same"),
         Translated("mass and inertia", "of the union of the spheres", "the same, given with each template"),
-        Translated("filling", f"{filled}; {scene.rain_rate:g} grains a second", f"{filled}; {rate}{slower}"),
+        Translated("filling", f"{filled}; {lift.given_rate:g} grains a second", f"{filled}; {rate}{slower}"),
         Translated("tube", "cylinder", "the same" if exact_tube else prism),
         Translated("plate", _plate(lift), _plate(lift)),
         Translated("lift", f"{scene.lift_speed:g} m/s", f"{scene.lift_speed:g} m/s, until clear of the heap"),

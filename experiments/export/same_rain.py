@@ -12,7 +12,8 @@ import numpy as np
 
 from dem_warp.model import WorldSetup
 from dem_warp.scenes.lifted_cylinder import CLOGGED, GONE, LiftController
-from dem_warp.scenes.poured_controller import CALM, HEAPED
+from dem_warp.scenes.phases import CALM
+from dem_warp.scenes.poured_controller import HEAPED
 from experiments.export.code_table import CodeTest
 from experiments.export.exporter import Translation
 from experiments.export.laws import Translated
@@ -158,7 +159,7 @@ def same_rain_rows(lift: Lift) -> list[Translated]:
     """Return rows of the README on the test, with what only a program has as it is here."""
     scene, grains = lift.scene, lift.case.grains
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
-    filling = f"{filled}; {scene.rain_rate:g} grains a second, {scene.rain_speed:g} m/s"
+    filling = f"{filled}; {lift.given_rate:g} grains a second, {scene.rain_speed:g} m/s"
     changes = {
         "sizes": (sizes_text(grains), "the same grains, one by one"),
         "filling": (filling, "the same places, orientations and times, one by one"),

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dem_warp.scenes.bench_formulas import rebound, rolling_run
 from doe import Sample, StatedValue
 from experiments.grains.sizes.size_tables import UnitHeader
 from experiments.io.errors import InputError
@@ -134,8 +135,7 @@ def _tangent(angle: float) -> float:
 
 
 def _rolling_run(slope: float, distance: float, run: float) -> float:
-    sine, cosine = math.sin(math.radians(slope)), math.cos(math.radians(slope))
-    return distance * sine / (distance * cosine + run)
+    return rolling_run(math.radians(slope), distance, run)
 
 
 def _rebound_45(fall: float, height_1: float, distance_1: float, height_2: float, distance_2: float) -> float:
@@ -177,7 +177,7 @@ METHODS: Mapping[str, tuple[Formula, ...]] = {
         Formula(
             "restitution",
             {"fall": "length", "height": "length"},
-            lambda fall, height: math.sqrt(height / fall),
+            rebound,
             "heights of fall and rebound; sqrt(height / fall)",
         ),
         Formula(

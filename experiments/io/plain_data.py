@@ -25,8 +25,9 @@ _PROPERTIES: dict[str, tuple[str, ...]] = {
         "anova", "coefficients", "coded_coefficients", "dropped", "r2", "r2_adjusted", "r2_predicted",
         "cv_percent", "adequate_precision",
     ),
+    "Transfer": ("level", "shift", "scale", "slope_values", "noise", "runs", "response"),
     "Region": ("fraction", "ranges", "open_ends", "extent", "resolution"),
-    "JointFit": ("point", "alpha", "extent", "shrinkage", "directions"),
+    "JointFit": ("point", "alpha", "extent", "shrinkage", "intervals", "directions"),
 }  # fmt: skip
 """Properties of each result of `doe` that results.json has, by class: naming a class loads statsmodels."""
 
@@ -70,6 +71,8 @@ def _properties(value: Any) -> dict[str, Any]:
             return jsonable(value.sample) | found
         case "Surface":
             return found | {"equation": value.equation("natural"), "equation_coded": value.equation("coded")}
+        case "Transfer":
+            return found | {"intervals": jsonable(value.intervals())}
         case "JointFit":
             return found | {"responses": jsonable(value.tests())}
     return found

@@ -60,7 +60,7 @@ def outside(thing: object) -> str:
     if thing is None:
         return ""
     module = _module(thing)
-    packages = packages_distributions().get(module.partition(".")[0], [])
+    packages = _packages().get(module.partition(".")[0], [])
     if not packages or "dem-warp" in packages:
         return ""
     try:
@@ -68,6 +68,9 @@ def outside(thing: object) -> str:
         return f"{module} (package {packages[0]}, {inspect.getsourcefile(thing)}, line {line})"  # type: ignore[arg-type]
     except (OSError, TypeError):
         return f"{module} (package {packages[0]})"
+
+
+_packages = cache(packages_distributions)
 
 
 def _module(thing: object) -> str:

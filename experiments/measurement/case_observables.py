@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +15,7 @@ from experiments.studyfile.observables import (
     NAMES,
     OBSERVABLES,
     OUTLINE,
+    READINGS,
     SOLID_FRACTION,
     View,
 )
@@ -62,6 +64,8 @@ def observe(settings: MeasurementSection, result: CaseResult, leaves_a_heap: boo
     views = [View.of(view) for view in heap.views]
     wanted = (*OBSERVABLES, *(OUTLINE if settings.outline else ()))
     seen = {each.column: each.in_heap(heap, views) for each in wanted if each.by_photograph}
+    with suppress(PictureError):  # a heap with flanks may have too few columns in their middle
+        seen |= {each.column: each.in_heap(heap, views) for each in READINGS}
     return Observed(seen | reported, heap)
 
 

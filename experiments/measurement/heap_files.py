@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,24 @@ from experiments.grains.spheres.clump_file import unit_option
 from experiments.io.errors import InputError
 from experiments.io.units import read_quantity
 from experiments.studyfile.study import MeasurementSection
-from imaging import Doubt, HeapAngle, PictureError, ReposeAngle, heap_angle, overlay, snapshot
+from imaging import (
+    Doubt,
+    HeapAngle,
+    HeapReadings,
+    PictureError,
+    ReposeAngle,
+    heap_angle,
+    heap_readings,
+    overlay,
+    snapshot,
+)
 from imaging.drawing.ground import REST, find_ground, height_is_along_y
 from imaging.geometry import Picture, Spheres
 from imaging.photo.doubts import ROUGH_EDGE, doubts_of_mean
 
 SIDES = ("left", "right")
+READINGS = tuple(field.name for field in fields(HeapReadings))
+"""Columns of the other readings of an outline."""
 DEFAULT_UNIT = "m"
 """Unit of a heap's file without a unit; angles do not depend on it."""
 BELOW = 0.5
@@ -160,7 +172,16 @@ def values_of(heap: MeasuredHeap, level: float) -> dict[str, Any]:
 def mean_values(
     angle: HeapAngle | ReposeAngle, left: float, right: float, level: float, doubts: Iterable[Doubt]
 ) -> dict[str, Any]:
-    """Return the values of any row."""
+    """Return the values of any row; other readings than the fit are means over the views of a heap."""
     low, high = angle.interval(level)
     values = {"left": left, "right": right, "mean": angle.mean, "se": angle.se, "low": low, "high": high}
-    return values | {"doubts": [str(doubt) for doubt in doubts]}
+    return values | _readings(angle) | {"doubts": [str(doubt) for doubt in doubts]}
+
+
+def _readings(angle: HeapAngle | ReposeAngle) -> dict[str, float]:
+    """Return the angle in every usual reading; empty where a flank has too few columns for one of them."""
+    views = (angle,) if isinstance(angle, ReposeAngle) else angle.views
+    with suppress(PictureError):
+        found = [astuple(heap_readings(view.outline)) for view in views]
+        return dict(zip(READINGS, np.mean(found, axis=0).tolist(), strict=True))
+    return {}

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dem_warp import Drum
 from doe import Sample
 from experiments.io.errors import InputError
 from experiments.io.units import Quantity
 from experiments.measurement.measured_file import read_measured
+from experiments.measurement.profile_files import Profiles, profiles_of
 from experiments.measurement.profile_responses import counted_twice, with_profiles
 from experiments.measurement.readings import require_same_fit
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
-from experiments.studyfile.observables import ANGLE, BY_NAME, filling
+from experiments.studyfile.observables import ANGLE, BY_NAME, SURFACE, SURFACE_PROFILE, filling
 from experiments.studyfile.target_section import ResponseSection, TargetSection
 
 if TYPE_CHECKING:
     from experiments.measurement.photographs import PictureOptions
+
+
+DRUM_ANGLE = "dynamic_angle"
+DRUM_GIVES = (DRUM_ANGLE, SURFACE_PROFILE)
+"""Observables of the target that photographs of a drum give."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,7 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
     notes
         Notes about the measurements.
     """
-    study = with_profiles(study)
+    study = with_profiles(study, _pictured_profiles(study))
     taken, notes = _with_source(study)
     return taken, (*notes, *counted_twice(taken))
 
@@ -81,9 +88,28 @@ def _with_pictures(study: Study, place: str) -> tuple[Study, tuple[str, ...]]:
     sample = target_sample(rows, options, place)
     names = [Path(row["picture"]).name for row in used_rows(rows, options)]
     note = f"{len(names)} pictures: {', '.join(names)}"
-    read = [f"{row['picture']}: {row['source']}" for row in rows if row["source"] != "photograph"]
-    target = _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note)
+    read = [
+        f"{row['picture']}: {row['source']}" for row in rows if row["source"] not in ("photograph", "drum")
+    ]
+    target = _given(study, [Replicated(TARGET_SCENE, DRUM_ANGLE if options.drum else ANGLE, sample)], note)
     return target, (*read, *left_out_notes(rows, options))
+
+
+def _pictured_profiles(study: Study) -> Profiles | None:
+    """Read the profiles of a drum from the pictures of a study's target; None where it asks for none."""
+    section = study.target_section
+    if section is None or section.pictures is None or section.observable != SURFACE_PROFILE:
+        return None
+    from experiments.measurement.photographs import measure_pictures, used_rows
+
+    options, scene = _options(study), study.case({}, 0, TARGET_SCENE).scene
+    rows = measure_pictures(find_pictured(study), replace(options, diameter=scene.diameter))
+    found: dict[str, list[dict[int, float]]] = {}
+    for row in used_rows(rows, options):
+        path = Path(row["picture"])
+        heights = {number: row[name] for number, name in enumerate(SURFACE) if row[name] is not None}
+        found.setdefault(path.parent.name if options.by == "folder" else path.name, []).append(heights)
+    return profiles_of(found, f"{study.file}: target.pictures")
 
 
 def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path: Path) -> Replicated | None:
@@ -111,8 +137,8 @@ def _options(study: Study) -> PictureOptions:
     if section is None:
         return PictureOptions(fit)
     view = section.view.view if section.view else View()
-    heaps = HeapSettings(types=tuple(map(str, section.types)))
-    return PictureOptions(fit, view, heaps, section.by, section.keep_doubtful)
+    heaps, drum = HeapSettings(types=tuple(map(str, section.types))), issubclass(study.scene.kind, Drum)
+    return PictureOptions(fit, view, heaps, section.by, section.keep_doubtful, drum)
 
 
 def find_pictured(study: Study) -> list[Path]:
@@ -120,11 +146,11 @@ def find_pictured(study: Study) -> list[Path]:
     section, place = study.target_section, f"{study.file}: target.pictures"
     if section is None or section.pictures is None:
         return []
-    if not study.scene.leaves_a_heap:
-        hint = "For a drum, give profiles."
-        raise InputError(place, "this test leaves no heap to photograph", study.scene.kind.name, hint)
-    if section.observable != ANGLE or section.scene != TARGET_SCENE:
-        problem = "photographs give only the angle of the study's own scene"
+    given = DRUM_GIVES if issubclass(study.scene.kind, Drum) else (ANGLE,)
+    if given == (ANGLE,) and not study.scene.leaves_a_heap:
+        raise InputError(place, "this test leaves no heap to photograph", study.scene.kind.name)
+    if section.observable not in given or section.scene != TARGET_SCENE:
+        problem = f"photographs give only the observable {' or '.join(given)} of the study's own scene"
         raise InputError(place, problem, section.title)
     from experiments.measurement.photographs import find_pictures, require_separate
 

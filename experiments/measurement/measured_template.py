@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from dem_warp import Drum
 from experiments.io.files import require_new_file, write_text
 from experiments.measurement.measured_file import COLUMNS
 from experiments.measurement.readings import CLOGGED_ROW
@@ -51,6 +52,11 @@ need it. A row with a picture and no observable gives all that the picture shows
 pictures of one heap counts. fit: part of the flank that a written angle was fitted to; it must be the
 study's, which is the default."""
 
+_DRUM = """
+
+picture: instead of a value, a picture of the drum along its axis, the camera level; its path is relative to
+this file. A row with a picture and no observable gives all that the picture shows."""
+
 
 def write_measured_template(study: Study, folder: Path | None = None) -> Path:
     """Write a commented file for the measured heaps of ``NAME.toml``, ``NAME-measured.csv``."""
@@ -63,7 +69,7 @@ def write_measured_template(study: Study, folder: Path | None = None) -> Path:
         conditions="\n".join(_described(condition) for condition in study.conditions),
         observables="\n".join(_defined(study)),
     )
-    head += _PICTURES if study.scene.leaves_a_heap else ""
+    head += _PICTURES if study.scene.leaves_a_heap else _DRUM if issubclass(study.scene.kind, Drum) else ""
     text = io.StringIO()
     text.writelines(f"# {line}".rstrip() + "\n" for line in head.splitlines())
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")

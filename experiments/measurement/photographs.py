@@ -20,8 +20,10 @@ from doe import Sample
 from experiments.grains.spheres import require_known, require_no_text
 from experiments.io.errors import InputError
 from experiments.io.files import replacing
+from experiments.measurement import drum_pictures
 from experiments.measurement.duplicates import Duplicates
 from experiments.measurement.heap_files import (
+    READINGS,
     HeapSettings,
     is_heap_file,
     mean_values,
@@ -36,6 +38,7 @@ from imaging import (
     View,
     measure_photograph,
     overlay,
+    overlay_drum,
     read_picture,
     save_picture,
 )
@@ -47,6 +50,7 @@ LEVEL = 0.95
 """Confidence level of all intervals."""
 ROW_VALUES = (
     "left", "right", "mean", "se", "low", "high", "tilt", "elevation", "distance", "plate", "heap_pixels",
+    *READINGS,
 )  # fmt: skip
 """Measured values of a row."""
 NOT_IN_NAMES = str.maketrans("", "", '/\\:*?"<>|')
@@ -70,6 +74,15 @@ class PictureOptions:
     """Pictures of one heap: each picture is another heap, or each folder is one heap."""
     keep_doubtful: bool = False
     """True: doubtful pictures count in the mean."""
+    drum: bool = False
+    """True: the pictures show rotating drums, along the axis."""
+    diameter: float | None = None
+    """Inner diameter of the drum [m]; None: heights are in radii of the drum."""
+
+    @property
+    def subject(self) -> str:
+        """Subject of the pictures: heap, or drum."""
+        return drum_pictures.DRUM if self.drum else "heap"
 
     def heap_of(self, picture: Path, number: int) -> Hashable:
         """Return the heap that a picture shows, given its number."""
@@ -127,8 +140,10 @@ def measure_pictures(
         the 95 % interval, ``tilt`` and ``elevation`` of the camera [degrees], its ``distance`` [heap widths]
         where it is known, the ``plate``'s line (x1, y1, x2, y2) and the heap's width ``heap_pixels``
         [pixels], all None for a failed one; ``correction``, the seen lines in words where the angles are
-        corrected for the camera's height; ``doubts``, a list of sentences; ``overlay``, the drawn copy or
-        None; ``reason`` of a failure, else empty.
+        corrected for the camera's height; ``line_angle``, ``middle_angle``, ``height_angle``,
+        ``centre_angle`` and ``volume_angle``, what other readings of the outline give; ``doubts``, a list
+        of sentences; ``overlay``, the drawn copy or None; ``reason`` of a failure, else empty. Of a drum
+        `drum_pictures.row_values` between ``source`` and ``correction``.
     """
     options = options or PictureOptions()
     FitSettings.of(options.fit)
@@ -142,23 +157,28 @@ def measure_pictures(
 
 
 def _measured_row(picture: Path, options: PictureOptions, copy: Path | None) -> Row:
-    row: Row = {"picture": str(picture), "source": "photograph", "fit": options.fit}
-    row |= dict.fromkeys(ROW_VALUES)
+    drum = {"source": drum_pictures.DRUM} | dict.fromkeys(drum_pictures.ROW_VALUES)
+    heap = {"source": "photograph", "fit": options.fit} | dict.fromkeys(ROW_VALUES)
+    row: Row = {"picture": str(picture)} | (drum if options.drum else heap)
     row |= {"correction": "", "doubts": [], "overlay": None, "reason": ""}
     # A picture may break a decoder, memory or a fit in unexpected ways: that is the reason of its row.
     try:
-        if is_heap_file(picture):
+        if options.drum:
+            found = drum_pictures.read_drum_file(picture, options.view)
+            row |= drum_pictures.row_values(found, options.diameter, LEVEL)
+            draw: Callable[[], tuple[Picture, ...]] = partial(_drawn, picture, overlay_drum, found)
+        elif is_heap_file(picture):
             row["source"] = "file of spheres"
-            heap = measure_heap_file(picture, options.fit, options.heaps)
-            row |= values_of(heap, LEVEL)
-            draw: Callable[[], tuple[Picture, ...]] = heap.pictures
+            measured = measure_heap_file(picture, options.fit, options.heaps)
+            row |= values_of(measured, LEVEL)
+            draw = measured.pictures
         else:
             require_known(picture)
             require_no_text(picture)
-            angle = measure_photograph(picture, options.fit, options.view)
+            angle = _angle_of(picture, options)
             row |= _values(angle)
             row["correction"] = angle.correction
-            draw = partial(_drawn_photograph, picture, angle)
+            draw = partial(_drawn, picture, overlay, angle)
         if copy:
             clean = copy.with_name(f"{copy.stem}-clean.png")
             for path, drawing in zip((copy, clean), draw(), strict=False):
@@ -175,8 +195,18 @@ def _measured_row(picture: Path, options: PictureOptions, copy: Path | None) -> 
     return row
 
 
-def _drawn_photograph(picture: Path, angle: ReposeAngle) -> tuple[Picture]:
-    return (overlay(read_picture(picture), angle),)
+def _angle_of(picture: Path, options: PictureOptions) -> ReposeAngle:
+    """Measure the angle of a heap; where a picture shows no heap but a drum, say so."""
+    try:
+        return measure_photograph(picture, options.fit, options.view)
+    except PictureError as error:
+        if os.path.isfile(picture) and drum_pictures.shows_drum(picture):
+            raise InputError(str(picture), "shows a rotating drum", hint="Use --drum.") from error
+        raise
+
+
+def _drawn(picture: Path, draw: Callable[..., Picture], found: object) -> tuple[Picture]:
+    return (draw(read_picture(picture), found),)
 
 
 def _values(angle: ReposeAngle) -> Row:
@@ -230,9 +260,11 @@ class MeanAngle:
     """Number of pictures in the mean."""
     left_out: tuple[str, ...]
     """Measured pictures that are left out because they are doubtful."""
+    of: str = "heap"
+    """Subject of the pictures: heap, or drum."""
 
     def __str__(self) -> str:
-        parts = [f"mean {self.mean:.2f} degrees of {self.n} heap{'s' if self.n > 1 else ''}"]
+        parts = [f"mean {self.mean:.2f} degrees of {self.n} {self.of}{'s' if self.n > 1 else ''}"]
         if self.sd is not None:
             parts.append(f"sd {self.sd:.2f}, 95 % interval {self.low:.2f} to {self.high:.2f}")
         if self.left_out:
@@ -258,10 +290,10 @@ def mean_angle(rows: Sequence[Mapping[str, Any]], options: PictureOptions | None
     left_out = tuple(row["picture"] for row in rows if row["mean"] is not None and row not in used)
     mean, n = float(means.mean()), len(means)
     if n == 1:
-        return MeanAngle(mean, None, n, None, None, len(used), left_out)
+        return MeanAngle(mean, None, n, None, None, len(used), left_out, options.subject)
     sd = float(means.std(ddof=1))
     reach = float(special.stdtrit(n - 1, 0.5 + 0.5 * LEVEL)) * sd / np.sqrt(n)
-    return MeanAngle(mean, sd, n, mean - reach, mean + reach, len(used), left_out)
+    return MeanAngle(mean, sd, n, mean - reach, mean + reach, len(used), left_out, options.subject)
 
 
 def target_sample(rows: Sequence[Mapping[str, Any]], options: PictureOptions, place: str) -> Sample:
@@ -290,8 +322,8 @@ def target_text(rows: Sequence[Mapping[str, Any]], options: PictureOptions) -> s
     used, left_out = (mean.pictures, len(mean.left_out)) if mean else (0, 0)
     return (
         f"[target]  # {used} photographs; left out as doubtful: {left_out}\n"
-        f'fit = "{options.fit}"\n'
-        f'mean = "{sample.mean:.3f} deg"\n'
+        + ('observable = "dynamic_angle"\n' if options.drum else f'fit = "{options.fit}"\n')
+        + f'mean = "{sample.mean:.3f} deg"\n'
         f'sd = "{sample.sd:.3f} deg"\n'
         f"n = {sample.n}\n"
     )

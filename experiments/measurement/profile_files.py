@@ -1,25 +1,31 @@
-"""Files of measured profiles: heights of a drum's surface or a heap's outline, as a tidy CSV.
+"""Files of measured profiles of drums and heaps, curves of a press and of a tool, points of shear; CSV.
 
-A row is a point, ``replicate, x, z`` with units, or, for a heap, ``replicate, picture, pixel``: a photograph,
-or a file of spheres of another code, whose grain may be given by its ``type``. The column ``view`` numbers
-views of a heap, or frames of a drum.
+A row is a point, ``replicate`` and with units ``x, z``, ``strain, stress``, ``normal, shear`` or ``depth,
+force``; or a picture: ``replicate, picture`` of a drum along its axis, ``replicate, picture, pixel`` of a
+heap, a photograph or a file of spheres of another code, whose grain may be given by its ``type``. The column
+``view`` numbers views of a heap, or frames of a drum.
 """
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterator, Mapping, Sized
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from dem_warp.scenes.drum_surface import STATIONS
+from dem_warp.scenes.penetration import PARTS
+from dem_warp.scenes.press_curve import LOADED, UNLOADED, strains_of
+from dem_warp.scenes.shear_points import LOADS
 from experiments.io.errors import InputError
 from experiments.io.rows import Row, read_rows
 from experiments.io.units import Quantity
 from experiments.measurement.duplicates import Duplicates
 from experiments.measurement.value_limits import ValueLimits
+from experiments.studyfile.observables import SHEAR_PROFILE, SURFACE
 from imaging import PictureError
 
 COLUMNS = ("replicate", "view", "x", "z", "picture", "pixel", "type")
@@ -36,6 +42,15 @@ MIRRORED = 5.0
 
 LEAST_POINTS = 8
 """Fewest points of a heap's profile."""
+
+OTHER_STRESS = 0.1
+"""Part by which the largest stress of a curve may differ from that of the test."""
+
+OTHER_DEPTH = 0.02
+"""Part by which a curve of a tool may end above the depth of the test."""
+
+LEAST_LOADS = 2
+"""Fewest loads of a shear test besides its pre-shear."""
 
 FOOT = 0.1
 """Largest height of a profile's ends, as a part of the heap's height."""
@@ -61,29 +76,158 @@ class _Points(NamedTuple):
     heights: dict[float, float]
 
 
+def read_profiles(path: Path, fit: str, size: ValueLimits) -> Profiles:
+    """Read the profiles of a test with a profile: of a drum, a press, a tool, a shear test or a heap."""
+    if size.radius is not None:
+        return read_drum_profiles(path, size.radius)
+    if size.stress is not None:
+        return (read_shear_points if size.profile == SHEAR_PROFILE else read_press_curves)(path, size.stress)
+    if size.depth:
+        return read_force_curves(path, size.depth)
+    return read_heap_profiles(path, fit, size)
+
+
+def read_force_curves(path: Path, depth: float) -> Profiles:
+    """Read forces on a tool on its way down to a depth [m], as means over equal parts of this depth.
+
+    A depth is that of the tip below the surface of the bed; there the force is 0 where a curve begins later.
+    """
+    found: dict[str, dict[float, float]] = {}
+    for row in read_rows(path, ("replicate", "depth", "force"), ("replicate", "depth", "force")):
+        points, place = found.setdefault(_label(row), {}), _length(row, "depth")
+        if place <= max(points, default=-math.inf):
+            raise row.error("must be larger than in the row before", "depth")
+        points[place] = _number(row, "force", "force")
+    _require_rows(found, path)
+    given, forces, ends = Duplicates(), [], depth * np.arange(PARTS + 1) / PARTS
+    for name, points in found.items():
+        given.add(tuple(points.items()), name, f"replicate {name}", str(path))
+        deepest, gap = max(points), np.diff([0.0, *(each for each in points if each > 0.0)]).max(initial=0.0)
+        if deepest < (1 - OTHER_DEPTH) * depth or gap > depth / PARTS:
+            problem = (
+                f"points must be at most {1e3 * depth / PARTS:.4g} mm apart, down to the study's depth, "
+            )
+            problem += f"{1e3 * depth:.4g} mm"
+            raise InputError(f"{path}: replicate {name}", problem, f"{1e3 * deepest:.4g} mm")
+        curve = ({0.0: 0.0} if min(points) > 0.0 else {}) | points
+        places = np.union1d(ends, list(curve))
+        force = np.interp(places, list(curve), list(curve.values()))
+        work = np.append(0.0, np.cumsum(np.diff(places) * (force[1:] + force[:-1]) / 2))
+        forces.append(np.diff(np.interp(ends, places, work)) * PARTS / depth)
+    return _profiles(list(range(PARTS)), {name: [each] for name, each in zip(found, forces, strict=True)})
+
+
+def read_press_curves(path: Path, stress: float) -> Profiles:
+    """Read curves of a piston that goes down to a stress [Pa] and back, as strains at parts of this stress.
+
+    The rows of a curve are in the order of the measurement. The strain is counted from the seat of the
+    piston, as that of the simulated test.
+    """
+    found: dict[str, list[list[float]]] = {}
+    for row in read_rows(path, ("replicate", "strain", "stress"), ("replicate", "strain", "stress")):
+        pressure, strain = _number(row, "stress", "pressure"), _number(row, "strain", "")
+        if not -1.0 < strain < 1.0:
+            raise row.error("must be a part of the height, between -1 and 1", "strain")
+        found.setdefault(_label(row), []).append([pressure, 1.0 - strain])
+    _require_rows(found, path)
+    given, strains = Duplicates(), []
+    for name, curve in found.items():
+        given.add(tuple(map(tuple, curve)), name, f"replicate {name}", str(path))
+        largest = max(pressure for pressure, _ in curve)
+        _require_largest(largest, stress, f"{path}: replicate {name}")
+        strains.append(strains_of(curve, largest))
+    both = all(curve[-1][0] <= UNLOADED[-1] * stress for curve in found.values())
+    kept = list(range(len(LOADED) + len(UNLOADED) * both))
+    return _profiles(kept, {name: [each[kept]] for name, each in zip(found, strains, strict=True)})
+
+
+def read_shear_points(path: Path, stress: float) -> Profiles:
+    """Read shear stresses at the loads of a test, from those next to them, and of its pre-shear at a stress.
+
+    The row with the largest normal stress, about `stress` [Pa], is the pre-shear.
+    """
+    found: dict[str, list[list[float]]] = {}
+    for row in read_rows(path, ("replicate", "normal", "shear"), ("replicate", "normal", "shear")):
+        found.setdefault(_label(row), []).append(
+            [_number(row, name, "pressure") for name in ("normal", "shear")]
+        )
+    _require_rows(found, path)
+    given = Duplicates()
+    shears, spans = [], []
+    for name, points in found.items():
+        given.add(tuple(map(tuple, points)), name, f"replicate {name}", str(path))
+        normal, shear = np.array(sorted(points)).T
+        _require_largest(float(normal[-1]), stress, f"{path}: replicate {name}")
+        if len(normal) < LEAST_LOADS + 1 or (np.diff(normal) <= 0.0).any():
+            problem = f"needs {LEAST_LOADS} different normal stresses or more below that of the pre-shear"
+            raise InputError(f"{path}: replicate {name}", problem, ", ".join(f"{n:g} Pa" for n in normal))
+        parts = np.array(LOADS) * normal[-1]
+        spans.append((parts > 0.99 * normal[0]) & (parts < 1.01 * normal[-2]))
+        shears.append(np.append(np.interp(parts, normal[:-1], shear[:-1]), shear[-1]))
+    kept = np.flatnonzero([*np.all(spans, axis=0), True]).tolist()
+    return _profiles(kept, {name: [each[kept]] for name, each in zip(found, shears, strict=True)})
+
+
+def _require_largest(largest: float, stress: float, place: str) -> None:
+    """Refuse a test whose largest stress [Pa] is not that of the study."""
+    if not abs(largest / stress - 1.0) < OTHER_STRESS:
+        problem = f"the largest stress must be that of the study, {stress:g} Pa"
+        raise InputError(place, problem, f"{largest:g} Pa")
+
+
 def read_drum_profiles(path: Path, radius: float) -> Profiles:
     """Read profiles of a drum of a radius [m] as heights above its axis, at its stations."""
     found: dict[str, dict[str, _Points]] = {}
-    for row in read_rows(path, ("replicate", "x", "z"), COLUMNS[:4]):
+    pictured: dict[str, list[dict[int, float]]] = {}
+    pictures = Duplicates()
+    for row in read_rows(path, ("replicate",), COLUMNS[:5]):
+        if row["picture"]:
+            _require_no_point(row)
+            pictured.setdefault(_label(row), []).append(_drawn_surface(row, radius))
+            pictures.add_file(path.parent / row["picture"], row.line, row["picture"], row.place("picture"))
+            continue
         x, z = _take_point(row, found)
         if np.hypot(x, z) > radius:
             problem = f"must be in the drum, within {1e3 * radius:g} mm of its axis"
             raise InputError(f"{path}:{row.line}: x, z", problem, f"x {row['x']}, z {row['z']}")
-    _require_rows(found, path)
+    _require_rows([*found, *pictured], path)
     places = np.array(STATIONS) * radius
-    views = {name: [view.heights for view in each.values()] for name, each in found.items()}
-    ends = [(min(view), max(view)) for each in views.values() for view in each]
-    low, high = max(end[0] for end in ends), min(end[1] for end in ends)
-    kept = [number for number, place in enumerate(places) if low <= place <= high]
-    if len(kept) < LEAST_STATIONS:
-        span = f"{1e3 * low:.4g} to {1e3 * high:.4g} mm, {len(kept)} stations"
-        raise InputError(str(path), f"all profiles must span {LEAST_STATIONS} stations of the drum", span)
+    heights = pictured
+    for name, each in found.items():
+        heights.setdefault(name, []).extend(_at_stations(view.heights, places) for view in each.values())
+    profiles = profiles_of(heights, str(path))
     for each in found.values():
         for view in each.values():
             _check_surface(view, radius, f"{path}:{view.line}")
     _require_own_points(found, path)
-    heights = {name: [_between(view, places[kept]) for view in each] for name, each in views.items()}
+    return profiles
+
+
+def profiles_of(views: Mapping[str, Sequence[Mapping[int, float]]], place: str) -> Profiles:
+    """Gather the views of drums, heights by station [m], at the stations that all of them have."""
+    shown = [set(view) for each in views.values() for view in each]
+    kept = sorted(set.intersection(*shown)) if shown else []
+    if len(kept) < LEAST_STATIONS:
+        span = f"{len(kept)} in all of {len(shown)} profiles"
+        raise InputError(place, f"all profiles must span {LEAST_STATIONS} stations of the drum", span)
+    heights = {name: [np.array([view[n] for n in kept]) for view in each] for name, each in views.items()}
     return _profiles(kept, heights)
+
+
+def _drawn_surface(row: Row, radius: float) -> dict[int, float]:
+    """Return the heights of the surface in a picture of a drum, by station [m]."""
+    # a file of points needs no pictures
+    from experiments.measurement.drum_pictures import sure_observed
+
+    seen = sure_observed(row.file.parent / row["picture"], radius, None, row.place("picture"))
+    return {number: seen[name] for number, name in enumerate(SURFACE) if name in seen}
+
+
+def _at_stations(view: Mapping[float, float], places: np.ndarray) -> dict[int, float]:
+    """Return the heights between the points of a view at the stations that it spans."""
+    x = sorted(view)
+    heights = np.interp(places, x, [view[each] for each in x])
+    return {n: float(h) for n, h in enumerate(heights) if x[0] <= places[n] <= x[-1]}
 
 
 def read_heap_profiles(path: Path, fit: str, size: ValueLimits) -> Profiles:
@@ -96,8 +240,7 @@ def read_heap_profiles(path: Path, fit: str, size: ValueLimits) -> Profiles:
     pictures = Duplicates()
     for row in read_rows(path, ("replicate",), COLUMNS):
         if row["picture"]:
-            if row["x"] or row["z"]:
-                raise row.error("must not be in a row with a point", "picture")
+            _require_no_point(row)
             heaps.setdefault(_label(row), []).extend(_pictured(row, fit, size))
             # views of one heap must be different pictures, too
             pictures.add_file(path.parent / row["picture"], row.line, row["picture"], row.place("picture"))
@@ -131,6 +274,11 @@ def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, 
     return x, z
 
 
+def _require_no_point(row: Row) -> None:
+    if row["x"] or row["z"]:
+        raise row.error("must not be in a row with a point", "picture")
+
+
 def _require_rows(found: Sized, path: Path) -> None:
     if not found:
         raise InputError(str(path), "has no rows below the names of the columns")
@@ -149,11 +297,6 @@ def _label(row: Row) -> str:
     if not row["replicate"]:
         raise row.error("needs a label, one for each profile", "replicate")
     return row["replicate"]
-
-
-def _between(view: Mapping[float, float], places: np.ndarray) -> np.ndarray:
-    x = sorted(view)
-    return np.interp(places, x, [view[each] for each in x])
 
 
 def _check_surface(view: _Points, radius: float, place: str) -> None:
@@ -231,7 +374,11 @@ def read_pixel(row: Row) -> float:
 
 
 def _length(row: Row, column: str) -> float:
+    return _number(row, column, "length")
+
+
+def _number(row: Row, column: str, dimension: str) -> float:
     try:
-        return Quantity.parse(row[column]).to_base("length")
+        return Quantity.parse(row[column]).to_base(dimension)
     except ValueError as error:
         raise row.error(str(error), column) from None

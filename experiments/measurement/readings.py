@@ -14,13 +14,11 @@ from experiments.io.errors import InputError, Problem
 from experiments.io.rows import Row
 from experiments.io.texts import nearest_name
 from experiments.io.units import Quantity
-from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles, read_pixel
+from experiments.measurement.profile_files import read_pixel, read_profiles
 from experiments.measurement.value_limits import ValueLimits
 from experiments.studyfile.observables import (
     DIMENSIONS,
-    OUTLINE_PROFILE,
     PROFILES,
-    SURFACE_PROFILE,
     Observable,
     View,
 )
@@ -33,6 +31,7 @@ CLOGGED = "the tube clogged"
 """Reason of a replicate without a heap because the grains stayed in the tube."""
 CLOGGED_ROW = "clogged"
 """Observable of a row for such a replicate."""
+NOT_SHOWN = "needs a value: photographs do not show it"
 PIXEL_RULE = "lengths in a picture need the size of its pixels, e.g. 0.1 mm"
 
 
@@ -112,18 +111,14 @@ def readings_of(
 
 def _profiled(row: Row, size: ValueLimits, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
     """Read the heights of the replicate's profile from the row's file of profiles."""
-    profile = SURFACE_PROFILE if size.radius is not None else OUTLINE_PROFILE
-    heights = PROFILES[profile]
-    if row["observable"] not in ("", profile) or row["value"] or row["picture"]:
-        raise row.error(f"must be alone, or with the observable {profile}", "profile")
+    heights = PROFILES.get(size.profile, ("",))
     if heights[0] not in known:
-        rule = "needs a drum, or a study with outline = true in [measurement]"
+        rule = "needs a drum, a compression, a shear test, a penetration, or outline = true in [measurement]"
         raise row.error(rule, "profile")
+    if row["observable"] not in ("", size.profile) or row["value"] or row["picture"]:
+        raise row.error(f"must be alone, or with the observable {size.profile}", "profile")
     path = row.file.parent / row["profile"]
-    if size.radius is not None:
-        found = read_drum_profiles(path, size.radius)
-    else:
-        found = read_heap_profiles(path, fit, size)
+    found = read_profiles(path, fit, size)
     name = row["replicate"]
     if name not in found.names:
         rule = f"has no profile in the file {path}, {nearest_name(name, found.names)}"
@@ -160,12 +155,14 @@ def _seen(
 ) -> Iterator[Reading]:
     """Measure a row's observable, or all observables, on its picture."""
     path, name = row.file.parent / row["picture"], row["observable"]
+    if size.radius is not None:
+        yield from _seen_in_drum(row, size, size.radius, known)
+        return
     if name and not known[name].by_photograph:
-        raise row.error("needs a value: photographs do not show it", "observable")
+        raise row.error(NOT_SHOWN, "observable")
     if not any(each.by_photograph for each in known.values()):
         raise row.error("this test leaves no heap to photograph: write the values", "picture")
-    if not os.path.isfile(path):  # unlike Path.is_file, it accepts names that are too long
-        raise row.error(f"no such file: {path}", "picture")
+    _require_file(row, path)
     pixel = read_pixel(row) if row["pixel"] else None
     if name and pixel is None and known[name].unit == "m":
         raise row.error(PIXEL_RULE, "pixel")
@@ -181,6 +178,28 @@ def _seen(
         if wanted and observable.by_photograph:
             value = observable.in_pictures(views)
             yield Reading(row, observable.name, value, row["picture"], _doubt(row, observable, value, size))
+
+
+def _seen_in_drum(
+    row: Row, size: ValueLimits, radius: float, known: Mapping[str, Observable]
+) -> Iterator[Reading]:
+    """Read a row's observable, or all observables, of a drum of a radius [m] on its picture."""
+    # a file of numbers needs no pictures
+    from experiments.measurement.drum_pictures import PICTURED, sure_observed
+
+    path, name = row.file.parent / row["picture"], row["observable"]
+    if name and name not in PICTURED:
+        raise row.error(NOT_SHOWN, "observable")
+    _require_file(row, path)
+    seen = sure_observed(path, radius, None, row.place("picture"))
+    for each in (name,) if name else PICTURED:
+        if each in seen and each in known:
+            yield Reading(row, each, seen[each], row["picture"], _doubt(row, known[each], seen[each], size))
+
+
+def _require_file(row: Row, path: Path) -> None:
+    if not os.path.isfile(path):  # unlike Path.is_file, it accepts names that are too long
+        raise row.error(f"no such file: {path}", "picture")
 
 
 def _doubt(row: Row, observable: Observable, value: float, size: ValueLimits) -> Problem | None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from experiments.calibrate.results import STAGES, Campaign, Outcome
+from experiments.calibrate.campaign import Campaign
+from experiments.calibrate.results import Outcome
 from experiments.report.cautions import cautions
 from experiments.report.kit import html
 from experiments.report.other_codes import other_codes_chapter
 from experiments.report.paper_text import pastes
 from experiments.report.pictures import HeapPicture
+from experiments.report.plan_page import next_test_chapters
 from experiments.report.sections import TITLES, Context, chapter, failed_chapter, stage_chapters
 from experiments.report.solid import SolidHeap
 from experiments.report.stage_tables import fixed_table, values_table
@@ -43,7 +45,7 @@ def render_page(
         )
         fixed = fixed_table(study, campaign.optimum, case)
         chapters += [other_codes_chapter(case), chapter("paper_text")]
-    chapters.append(failed_chapter(campaign))
+    chapters += [*next_test_chapters(campaign, study), failed_chapter(campaign)]
     chapters += [*companion_of(study).campaign_chapters(campaign), chapter("provenance")]
     drawn_on = {
         "campaign": campaign,
@@ -56,7 +58,7 @@ def render_page(
         "pastes": pastes(campaign, study, provenance or {}),
         "solid": solid,
         "calibrated": headline(campaign) == HEADLINES[Outcome.CALIBRATED],
-        "unreached": [TITLES[name] for name in STAGES if name not in campaign.stages],
+        "unreached": [TITLES[name] for name in campaign.unreached],
         "leading": context.leading,
         "labels": labels,
         "facts": study_facts(study),

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from dem_warp import PlacedScene
+from experiments.calibrate.campaign import Campaign
 from experiments.calibrate.direct_checks import disagreement_text
-from experiments.calibrate.results import Campaign
 from experiments.measurement.filling import filling_missed, filling_reached, filling_text
 from experiments.report.kit.numbers import capital, enumeration, fixed
 from experiments.report.kit.sentences import say
@@ -50,7 +51,7 @@ def cautions(campaign: Campaign, study: Study) -> list[Caution]:
 def study_cautions(study: Study) -> list[Caution]:
     """List what limits any values found with a study's heaps, whatever they are compared with."""
     grains = study.case({}, seed=0).scene.grain_count
-    return [*_small(grains), *_unlikely(study), *_softened(study)]
+    return [*_small(grains, study), *_unlikely(study), *_softened(study)]
 
 
 def _twin(campaign: Campaign, study: Study) -> Iterator[Caution]:
@@ -61,7 +62,7 @@ def _twin(campaign: Campaign, study: Study) -> Iterator[Caution]:
 def _heaps(campaign: Campaign, study: Study) -> Iterator[Caution]:
     cases = campaign.cases
     if "grain_count" in cases:
-        yield from _small(cases.loc[cases["scene"] == TARGET_SCENE, "grain_count"].median())
+        yield from _small(cases.loc[cases["scene"] == TARGET_SCENE, "grain_count"].median(), study)
     yield from _unlikely(study)
 
 
@@ -76,8 +77,8 @@ def _filling(campaign: Campaign, study: Study) -> Iterator[Caution]:
             yield Caution(say("caution.filling", filling=filling_text(scene, reached)), "summary")
 
 
-def _small(grains: float | None) -> Iterator[Caution]:
-    if grains and grains < FEW_GRAINS:
+def _small(grains: float | None, study: Study) -> Iterator[Caution]:
+    if grains and grains < FEW_GRAINS and not issubclass(study.scene.kind, PlacedScene):
         yield Caution(say("caution.small", few=FEW_GRAINS), "summary")
 
 

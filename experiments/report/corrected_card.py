@@ -14,7 +14,7 @@ from experiments.io.toml_files import toml_text
 from experiments.report.material_card import (
     CARD,
     compatible_points,
-    open_ends,
+    edges,
     quantity_text,
     sample_table,
     short,
@@ -60,7 +60,7 @@ def corrected_card(crossing: Crossing) -> dict[str, Any]:
         card["compatible"] = compatible_points(region)
         for name, ends in region.ranges.iterrows() if region.mask.any() else ():
             card["factor"][name] |= {end: short(ends[end]) for end in ("low", "high")}
-            card["factor"][name]["not_explored_beyond"] = open_ends(region, str(name))
+            card["factor"][name]["not_explored_beyond"] = edges(region.open_ends.loc[name])
     card[BRIDGE] = _bridge(crossing)
     return card
 

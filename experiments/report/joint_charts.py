@@ -32,9 +32,11 @@ def joint_charts(
     """Draw the shares that are left, and for every pair of factors where each response agrees."""
     if optimum.joint is None:
         return []
-    pairs = itertools.combinations(surface.design.names, 2)
+    pairs = list(itertools.combinations(surface.design.names, 2))
     planes = [_plane_chart(optimum.joint, x, y, surface, optimum, target, responses) for x, y in pairs]
-    return [_shares_chart(optimum.joint), *planes]
+    first = [Slice(surface.leading.final, *pair, optimum.point, responses[0]) for pair in pairs[:1]]
+    steps = [_steps_chart(optimum.joint, plane, target) for plane in first]
+    return [_shares_chart(optimum.joint), *steps, *planes]
 
 
 def _shares_chart(joint: JointFit) -> Chart:
@@ -48,6 +50,18 @@ def _shares_chart(joint: JointFit) -> Chart:
     return Chart("joint-shares", caption, figure)
 
 
+def _steps_chart(joint: JointFit, plane: Slice, target: TargetResult) -> Chart:
+    design = plane.surface.design
+    figure = new_figure(design.factor(plane.x).label, design.factor(plane.y).label)
+    names = [str(name) for name in joint.shrinkage.index]
+    for count, (name, color) in enumerate(zip(names, itertools.cycle(COLORS), strict=False), start=1):
+        region = joint.region(*names[:count])
+        add_region(figure, plane, region, name if count == 1 else f"+ {name}", _translucent(color))
+    add_settings(figure, plane, target.truth, plane.point, "chosen")
+    caption = "What is compatible after each measurement, in the order of the table."
+    return Chart("joint-steps", caption + plane.held_text, figure, height="tall")
+
+
 def _plane_chart(
     joint: JointFit,
     x: str,
@@ -57,7 +71,7 @@ def _plane_chart(
     target: TargetResult,
     responses: Sequence[Response],
 ) -> Chart:
-    fits = [(one, surface.responses[one.name].reduced) for one in responses if not one.held_out]
+    fits = [(one, surface.responses[one.name].final) for one in responses if not one.held_out]
     plane = Slice(fits[0][1], x, y, optimum.point, fits[0][0])
     figure = new_figure(surface.design.factor(x).label, surface.design.factor(y).label)
     colors = itertools.cycle(COLORS)

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from doe import Region, Sample
-from experiments.calibrate.results import Campaign, OptimumResult
+from experiments.calibrate.campaign import Campaign
+from experiments.calibrate.results import OptimumResult
 from experiments.io.files import write_text
 from experiments.io.plug_ins import plug_in_versions
 from experiments.io.toml_files import toml_text
@@ -59,7 +61,7 @@ def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> d
         "fitted": _fitted(campaign, study) | {"test": chosen["scene"]},
         "factor": _factors(optimum, study),
         "compatible": compatible_points(optimum.region),
-        SURFACE: _surfaces(campaign),
+        **({SURFACE: surfaces} if (surfaces := _surfaces(campaign)) else {}),
         MATERIAL: copy.deepcopy({key: chosen[key] for key in SECTIONS if key in chosen}),
     }
 
@@ -119,31 +121,31 @@ def sample_table(sample: Sample, unit: str) -> dict[str, Any]:
 
 
 def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
-    region, found = optimum.region, bool(optimum.region.mask.any())
+    ranges, found = optimum.ranges, bool(optimum.region.mask.any())
     parameters = {section.name: section.parameter for section in study.factor_sections}
     return {
         factor.name: {
             "parameter": ", ".join(parameters[factor.name]),
             "unit": factor.unit,
             "chosen": short(optimum.point[factor.name]),
-            "low": short(region.ranges["low"][factor.name]) if found else None,
-            "high": short(region.ranges["high"][factor.name]) if found else None,
-            "not_explored_beyond": open_ends(region, factor.name),
+            "low": short(ranges["low"][factor.name]) if found else None,
+            "high": short(ranges["high"][factor.name]) if found else None,
+            "not_explored_beyond": edges(ranges.loc[factor.name, ["low_open", "high_open"]]),
             "identified": factor.name not in optimum.unidentified,
         }
-        for factor in region.factors
+        for factor in optimum.region.factors
     }
 
 
 def _surfaces(campaign: Campaign) -> dict[str, Any]:
-    if campaign.surface is None:
-        return {}
+    if campaign.surface is None or campaign.fidelity is not None:
+        return {}  # those of a cheaper scale are not those of the card's test
     return {name: surface_table(found.reduced) for name, found in campaign.surface.responses.items()}
 
 
-def open_ends(region: Region, name: str) -> list[str]:
+def edges(opened: pd.Series) -> list[str]:
     """Name the ends of a factor's range ("low", "high") beyond which nothing was explored."""
-    return [str(end) for end, opened in region.open_ends.loc[name].items() if opened]
+    return [str(end).removesuffix("_open") for end, edge in opened.items() if edge]
 
 
 def compatible_points(region: Region) -> dict[str, Any]:

@@ -9,8 +9,7 @@ from typing import Any
 import pandas as pd
 
 from dem_warp import EDEM
-from doe import Region
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.campaign import Campaign
 from experiments.io.program_version import program_version
 from experiments.report.kit.latex import latex_table, latex_text
 from experiments.report.kit.markdown import markdown_table
@@ -73,8 +72,7 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
         raise ValueError("a campaign that chose no point has no values")
     rows = []
     for factor in study.factors:
-        calibrated, region = factor.name in optimum.point, optimum.region
-        ends = _ends(region, factor.name) if calibrated else []
+        ends = _ends(optimum.ranges.loc[factor.name]) if factor.name in optimum.point else []
         rows.append(
             {
                 "parameter": study.labels[factor.name],
@@ -94,11 +92,10 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
     return make_table("paper", pd.DataFrame(rows), shown, caption, note)
 
 
-def _ends(region: Region, name: str) -> list[str]:
-    """Write both ends of a factor's compatible range; those beyond which nothing was explored say so."""
-    values, opened = region.ranges.loc[name], region.open_ends.loc[name]
-    forms = {end: open_end(end) if opened[end] else "{}" for end in ("low", "high")}
-    return [form.format(significant(float(values[end]), 3)) for end, form in forms.items()]
+def _ends(ends: pd.Series) -> list[str]:
+    """Write both ends of a factor's range; those beyond which nothing was explored say so."""
+    forms = {end: open_end(end) if ends[f"{end}_open"] else "{}" for end in ("low", "high")}
+    return [form.format(significant(float(ends[end]), 3)) for end, form in forms.items()]
 
 
 def simulated_sentences(study: Study) -> Iterator[str]:
@@ -128,6 +125,8 @@ def _designs(campaign: Campaign, study: Study) -> Iterator[str]:
     r2, predicted = fixed(fit.reduced.r2, 2), fixed(fit.reduced.r2_predicted, 2)
     runs, p = len(campaign.surface.design.coded), p_clause(fit.full.anova["p"]["lack of fit"])
     yield say("methods.surface", runs=runs, r2=r2, predicted=predicted, p=p)
+    if (moved := campaign.fidelity) is not None:
+        yield say("methods.moved", scale=moved.scale, runs=len(moved.cases))
 
 
 def _choice(campaign: Campaign, study: Study) -> Iterator[str]:

@@ -12,7 +12,9 @@ import numpy as np
 import pandas as pd
 
 from dem_warp import CaseResult
-from experiments.calibrate.results import Campaign
+from dem_warp.cores import cores
+from experiments.calibrate.campaign import Campaign
+from experiments.cases.measuring import MeasuringThreads
 from experiments.measurement.case_observables import measure_heap
 from experiments.report.kit.numbers import trimmed
 from experiments.studyfile import Study
@@ -49,12 +51,14 @@ def heap_pictures(campaign: Campaign, study: Study, load: Callable[[str], CaseRe
     """
     cases = campaign.cases
     kept = campaign.selection.kept if campaign.selection else ()
-    pictures = []
-    for stage, count in SHOWN_OF_A_STAGE.items():
-        shown = _spread(cases[(cases["stage"] == stage) & cases["angle"].notna()], count)
-        for case in shown.to_dict("records"):
-            pictures.append(_picture(case, study, load(str(case["case_key"])), kept))
-    return pictures
+    measured = cases[cases["angle"].notna()]
+    shown = [
+        case
+        for stage, count in SHOWN_OF_A_STAGE.items()
+        for case in _spread(measured[measured["stage"] == stage], count).to_dict("records")
+    ]
+    with MeasuringThreads(cores()) as threads:
+        return list(threads.map(lambda case: _picture(case, study, load(str(case["case_key"])), kept), shown))
 
 
 def _spread(cases: pd.DataFrame, count: int) -> pd.DataFrame:

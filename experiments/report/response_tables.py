@@ -9,8 +9,9 @@ import pandas as pd
 from markupsafe import Markup
 
 from doe import JointFit
+from experiments.calibrate.campaign import Campaign
 from experiments.calibrate.joint import direction_text, open_directions
-from experiments.calibrate.results import Campaign, ScreeningResult, SurfaceResult
+from experiments.calibrate.results import ScreeningResult, SurfaceResult
 from experiments.report.kit.numbers import term, unit_sign
 from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
@@ -71,7 +72,7 @@ def _goal(campaign: Campaign, response: Response) -> dict[str, Any]:
     if campaign.noise_floor is not None and not response.held_out:
         facts["noise"] = campaign.noise_floor.responses[name].sd
     if campaign.optimum is not None and campaign.surface is not None and not response.held_out:
-        fit = campaign.surface.responses[name].reduced
+        fit = campaign.surface.responses[name].final
         facts["reduced"] = float(fit.predict(campaign.optimum.point)["mean"].iloc[0])
     if campaign.verification is not None:
         test = campaign.verification.responses[name]
@@ -139,8 +140,7 @@ def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
         Column("direction", "no.", "label"),
         "moves",
         *(Column(name, f"{name} coded", "coded") for name in names),
-        Column("half_width", "half width, coded", "free"),
-        Column("span", "compatible span", "percent", "%"),
+        Column("span", "span", "percent", "%"),
         Column("open", "verdict"),
     ]
     level, span = 100.0 * (1.0 - joint.alpha), 100.0 * settings.unidentified_span

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from experiments.calibrate.campaign import Campaign
+from experiments.calibrate.fidelity_stage import FidelityResult
 from experiments.calibrate.results import (
-    Campaign,
     ClimbResult,
     NoiseFloorResult,
     OptimumResult,
@@ -33,6 +34,7 @@ TITLES = {
     "selection": "Factors kept",
     "climb": "Steepest climb",
     "surface": "Response surface",
+    "fidelity": "The surface at this scale",
     "optimum": "Optimum and compatible region",
     "responses": "Several responses",
     "verification": "Verification",
@@ -148,6 +150,14 @@ def _surface(context: Context, result: SurfaceResult) -> Chapter:
     return chapter("surface", tables, [*drawn, *surface_charts.residual_charts(fit.reduced, response)])
 
 
+def _fidelity(context: Context, result: FidelityResult) -> Chapter:
+    caption = f"Runs that move the surface of the scale {result.scale}."
+    factors = next(iter(result.responses.values())).design.factors
+    responses = [one for one in context.campaign.responses if not one.held_out]
+    table = stage_tables.cases_table("fidelity", result.cases, responses, caption, factors)
+    return chapter("fidelity", {"cases": table})
+
+
 def _optimum(context: Context, result: OptimumResult) -> Chapter:
     return chapter("optimum")
 
@@ -177,6 +187,7 @@ _STAGES: dict[str, Callable[[Context, Any], Chapter]] = {
     "selection": _selection,
     "climb": _climb,
     "surface": _surface,
+    "fidelity": _fidelity,
     "optimum": _optimum,
     "verification": _verification,
 }

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from dem_warp import CaseResult
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.campaign import Campaign
 from experiments.report.pictures import HeapPicture
 from imaging import snapshot
 

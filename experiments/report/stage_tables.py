@@ -10,8 +10,8 @@ import pandas as pd
 
 from dem_warp import Case
 from doe import Comparison, Factor, ScreenResult, Surface
+from experiments.calibrate.campaign import Campaign
 from experiments.calibrate.results import (
-    Campaign,
     ClimbResult,
     FittedResponse,
     OptimumResult,
@@ -97,8 +97,14 @@ def target_table(campaign: Campaign) -> Table:
     return make_table("target", pd.DataFrame(rows), shown, "What is to be matched.", note)
 
 
-def cases_table(name: str, cases: pd.DataFrame, responses: Sequence[Response], caption: str) -> Table:
-    """Lay out replicated cases of one setting."""
+def cases_table(
+    name: str,
+    cases: pd.DataFrame,
+    responses: Sequence[Response],
+    caption: str,
+    factors: Sequence[Factor] = (),
+) -> Table:
+    """Lay out replicated cases of one setting, or of settings of some factors."""
     measured = {response.observable: response for response in responses}
     several = len(cases["scene"].unique()) > 1
     facts = (
@@ -110,6 +116,7 @@ def cases_table(name: str, cases: pd.DataFrame, responses: Sequence[Response], c
     shown: Layout = [
         *(["scene"] if several else []),
         *columns("label", replicate="case", seed="seed"),
+        *(Column(factor.name, factor.name, "value", factor.unit) for factor in factors),
         *(column for column in facts if column.key not in measured),
         *(response_column(response, key) for key, response in measured.items()),
         *columns("angle", "°", angle_se="se of the angle over views"),
@@ -232,19 +239,19 @@ def quality_table(result: FittedResponse) -> Table:
 
 def values_table(campaign: Campaign, optimum: OptimumResult, study: Study) -> Table:
     """Lay out the value of every factor, with the values that are as good where it was calibrated."""
-    region, chosen = optimum.region, optimum.point
+    ranges, chosen = optimum.ranges, optimum.point
     frame = pd.DataFrame(
         {
             "label": study.labels,
             "value": optimum.settings,
             "unit": {factor.name: factor.unit for factor in campaign.factors},
-            "low": region.ranges["low"],
-            "high": region.ranges["high"],
+            "low": ranges["low"],
+            "high": ranges["high"],
             "how": {name: _how(name, optimum, study) for name in optimum.settings},
         }
     ).rename_axis("factor")
-    for end, opened in region.open_ends.items():
-        frame[f"{end} around"] = opened.map({True: open_end(str(end)), False: "{}"})
+    for end in ("low", "high"):
+        frame[f"{end} around"] = ranges[f"{end}_open"].map({True: open_end(end), False: "{}"})
         frame[f"{end} around"] = frame[f"{end} around"].fillna("{}")
     frame = frame.loc[[*chosen, *(name for name in optimum.settings if name not in chosen)]]
     shown: Layout = [
@@ -257,7 +264,9 @@ def values_table(campaign: Campaign, optimum: OptimumResult, study: Study) -> Ta
     ]
     marks = ["chosen" if name in chosen else "" for name in frame.index]
     caption = "Calibrated values (marked), and those that every case shared."
-    return make_table("values", frame, shown, caption, say("note.values") if len(chosen) > 1 else "", marks)
+    level = f"{100.0 * campaign.settings.optimum.confidence:.3g}"
+    note = say("note.intervals", level=level) if optimum.joint else say("note.values")
+    return make_table("values", frame, shown, caption, note if len(chosen) > 1 else "", marks)
 
 
 def fixed_table(study: Study, optimum: OptimumResult, case: Case[Any]) -> Table:

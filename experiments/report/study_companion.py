@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.campaign import Campaign
 from experiments.io.errors import StudyError
 from experiments.io.texts import nearest_name
 from experiments.report.kit.html import Chapter

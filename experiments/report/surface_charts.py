@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from doe import Design, Region, Surface
+from doe import Design, Region, Surface, Transfer
 from doe.plots.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from doe.plots.plot_data import SurfaceGrid, normal_points, surface_grid
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
@@ -30,7 +30,7 @@ CURVE_POINTS = 121
 class Slice:
     """A plane through the surface along two factors, the others held."""
 
-    surface: Surface
+    surface: Surface | Transfer
     x: str
     y: str
     point: Mapping[str, float]
@@ -66,7 +66,7 @@ def surface_charts(
     if len(design.names) == 1:
         return [_curve_chart(result, optimum, target, response)]
     point = optimum.point if optimum else result.center
-    fit, pairs = result.leading.reduced, itertools.combinations(design.names, 2)
+    fit, pairs = result.leading.final, itertools.combinations(design.names, 2)
     planes = [Slice(fit, x, y, point, response) for x, y in pairs]
     contours = [_contour_chart(plane, result, optimum, target) for plane in planes]
     return [_relief_chart(_strongest(planes), result, optimum, target), *contours]
@@ -92,8 +92,9 @@ def residual_charts(surface: Surface, response: Response) -> list[Chart]:
 
 
 def _strongest(planes: list[Slice]) -> Slice:
-    slopes = planes[0].surface.coded_coefficients.abs()
-    return max(planes, key=lambda plane: slopes.get(plane.x, 0.0) + slopes.get(plane.y, 0.0))
+    fit = planes[0].surface
+    slopes = dict(zip(fit.design.names, np.abs(fit.quadratic_form.slopes), strict=True))
+    return max(planes, key=lambda plane: slopes[plane.x] + slopes[plane.y])
 
 
 def _relief_chart(
@@ -112,10 +113,9 @@ def _relief_chart(
         hovertemplate=plane.hover,
         name="fitted surface",
     )
-    full = result.leading.full
-    measured = full.design.natural
+    measured, values = result.leading.shown
     if len(measured.columns) == 2:
-        _add_points_3d(figure, plane, measured, full.response, "cases", BLUE)
+        _add_points_3d(figure, plane, measured, values, "cases", BLUE)
         if optimum is not None:
             _add_target_curve(figure, plane, optimum, target.leading.mean)
     if optimum is not None:
@@ -160,7 +160,7 @@ def _curve_chart(
 ) -> Chart:
     (factor,) = result.design.factors
     x = factor.to_natural(np.linspace(-1.0, 1.0, CURVE_POINTS) * _extent(result.design))
-    fit = result.leading.reduced.predict(pd.DataFrame({factor.name: x}))
+    fit = result.leading.final.predict(pd.DataFrame({factor.name: x}))
     figure = new_figure(factor.label, axis_title(response))
     add_target(figure, target.leading.mean, target.leading.se)
     around = np.r_[fit["confidence_low"], fit["confidence_high"][::-1]]
@@ -169,8 +169,8 @@ def _curve_chart(
         x=np.r_[x, x[::-1]], y=around, mode="lines", name="95 % confidence, full model", **shade
     )
     add_line(figure, x, fit["mean"], "fit, reduced model", BLUE)
-    full = result.leading.full
-    add_points(figure, full.design.natural[factor.name], full.response, "case", BLUE, size=8)
+    measured, values = result.leading.shown
+    add_points(figure, measured[factor.name], values, "case", BLUE, size=8)
     if target.truth is not None:
         hidden = [target.truth[factor.name]], [target.leading.mean]
         add_points(figure, *hidden, "hidden truth", PURPLE, "star", 16)

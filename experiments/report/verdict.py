@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from experiments.calibrate.results import Campaign, Outcome
+from experiments.calibrate.campaign import Campaign
+from experiments.calibrate.results import Outcome
 from experiments.report.kit.numbers import enumeration
 from experiments.report.kit.sentences import say
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import pandas as pd
 
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.campaign import Campaign
+from experiments.calibrate.plan.choice import TestPlan
 from experiments.io.files import write_text
 from experiments.io.plain_data import jsonable
 from experiments.io.plug_ins import plug_in_versions
@@ -20,6 +21,7 @@ from experiments.io.texts import safe_cell
 from experiments.report.campaign_page import render_page
 from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
+from experiments.report.plan_page import render_plan
 from experiments.report.solid import SolidHeap
 from experiments.studyfile import Study
 
@@ -47,6 +49,19 @@ def write_report(
     write_files(folder, study, page, {"campaign": campaign.to_dict()}, made_by, campaign.tables())
     write_material_card(campaign, study, folder)
     return folder / PAGE
+
+
+def write_plan(plan: TestPlan, study: Study, folder: Path, provenance: Mapping[str, Any]) -> None:
+    """Write ``report.html``, ``results.json`` and ``tables/*.csv`` of a plan of tests."""
+    made_by = {**provenance, "study": study.sha256, "versions": library_versions()}
+    write_files(
+        folder,
+        study,
+        render_plan(plan, study),
+        {"plan": plan.to_dict()},
+        made_by,
+        {"plan": plan.table.reset_index()},
+    )
 
 
 def write_files(

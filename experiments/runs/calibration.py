@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from experiments.calibrate import Campaign, calibrate
+from experiments.calibrate.fidelity_stage import OWN_SCALE
 from experiments.calibrate.results import Outcome, StageResult, TargetResult
 from experiments.calibrate.stages import StageHook
 from experiments.report import heap_pictures, verified_heap, write_report
@@ -17,6 +18,7 @@ from experiments.report.study_companion import companion_of
 from experiments.report.verdict import verdict_sentence
 from experiments.runs.choices import Prepared, with_pictures
 from experiments.runs.run_folder import Run, open_run
+from experiments.studyfile import cheaper_study
 
 
 @dataclass(frozen=True)
@@ -54,17 +56,23 @@ def run_calibration(prepared: Prepared, on_stage: StageHook | None = None) -> Ca
     """
     prepared = with_pictures(prepared)
     companion_of(prepared.study)  # one that is missing is refused now
+    cheaper_study(prepared.study)
     with open_run("calibrate", prepared) as run:
         return Calibration(run.folder, run_campaign(run, on_stage))
 
 
 def run_campaign(run: Run, on_stage: StageHook | None = None) -> Campaign:
     """Run the campaign of an open run, and publish its report."""
+    cheaper = replace(run, study=cheaper_study(run.study))
 
     def simulate(table: pd.DataFrame) -> pd.DataFrame:
-        return run.run_cases(
-            table, ", ".join(str(each).replace("_", " ") for each in table["stage"].unique())
-        )
+        own = table["stage"].isin(OWN_SCALE) if run.study.campaign.fidelity else table["stage"].notna()
+        parts = [
+            one.run_cases(rows, ", ".join(str(each).replace("_", " ") for each in rows["stage"].unique()))
+            for one, rows in ((run, table[own]), (cheaper, table[~own]))
+            if len(rows)
+        ]
+        return pd.concat(parts).loc[table.index]
 
     def note(name: str, result: StageResult) -> None:
         responses = result.responses if isinstance(result, TargetResult) else None

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -25,7 +25,7 @@ from experiments.discover.search import Search
 from experiments.io.errors import StudyError
 from experiments.runs.choices import Prepared, with_pictures
 from experiments.runs.search import SearchData, known_bank, read_data
-from experiments.studyfile import Study
+from experiments.studyfile import Study, cheaper_study
 from experiments.studyfile.campaign import TARGET_SCENE, scenes_of
 
 SAMPLE = 64
@@ -52,6 +52,8 @@ class PlannedBatch:
     """Expected wall time [s]; None where it is unknown."""
     noted: tuple[int, ...]
     """Numbers of the noted batches that the time comes from."""
+    phases: Mapping[str, int] = field(default_factory=dict)
+    """Steps of each phase where the cases have the same ones, means over them."""
 
 
 @dataclass(frozen=True)
@@ -93,19 +95,27 @@ def plan_calibration(prepared: Prepared) -> Plan:
 
 def _campaign_stages(study: Study) -> list[_Stage]:
     """Return the stages, with the usual number of kept factors and steps of the climb."""
-    settings, target = study.campaign, study.target
+    settings, target, cheaper = study.campaign, study.target, cheaper_study(study)
     opening = plan_opening(study, screening_design(study.factors, settings.screening))
     scenes = scenes_of(target.fitted)
-    middle = [study.case({}, 1, scene) for scene in scenes]
+    own, middle = ([one.case({}, 1, scene) for scene in scenes] for one in (study, cheaper))
     steps = settings.climb.steps * settings.climb.replicates
     kept = len(settings.selection.keep or ()) or min(settings.selection.at_most, len(study.factors))
     surface = _surface_cases(study, kept) * len(scenes)
     fresh = settings.verification.replicates * len(scenes_of(target.responses))
+    moved = settings.fidelity.middle + settings.fidelity.runs if settings.fidelity else 0
+    at_own = [("runs at this scale", own, moved * len(scenes), moved * len(scenes))] if moved else []
     return [
-        ("target, noise floor, screening", _sampled(study, opening), len(opening), len(opening)),
-        ("climb", [study.case({}, 1, target.leading.scene)], steps, steps * (1 + settings.climb.extensions)),
+        ("target, noise floor, screening", _sampled(cheaper, opening), len(opening), len(opening)),
+        (
+            "climb",
+            [cheaper.case({}, 1, target.leading.scene)],
+            steps,
+            steps * (1 + settings.climb.extensions),
+        ),
         ("surface", middle, surface, surface),
-        ("verification", middle, fresh, fresh),
+        *at_own,
+        ("verification", own, fresh, fresh),
     ]
 
 
@@ -138,6 +148,14 @@ def plan_heap(prepared: Prepared, case: Case) -> Plan:
     return _plan("heap", prepared, [("heap", [case], 1, 1)], GRAIN_BYTES * work_of(case).grains)
 
 
+def plan_tests(prepared: Prepared, tables: Mapping[str, pd.DataFrame]) -> Plan:
+    """Plan the cases of candidates, by the titles of their batches."""
+    study = prepared.study
+    stages = [(name, _sampled(study, table), len(table), len(table)) for name, table in tables.items()]
+    grains = max((work_of(case).grains for _, some, *_ in stages for case in some), default=0)
+    return _plan("plan", prepared, stages, CASE_BYTES + GRAIN_BYTES * grains)
+
+
 def _sampled(study: Study, table: pd.DataFrame) -> list[Case]:
     cases = []
     for row in table.sample(min(SAMPLE, len(table)), random_state=0).to_dict("records"):
@@ -164,4 +182,7 @@ def _batch(name: str, some: Sequence[Case], count: int, most: int, resources: Re
     grains, spheres, steps = np.mean([(work.grains, work.spheres, work.steps) for work in works], axis=0)
     repeated = [works[i % len(works)] for i in range(count)]
     time = forecast(repeated, resources) if count else (0.0, ())
-    return PlannedBatch(name, count, most, round(grains), round(spheres), round(steps), *time)
+    names = {tuple(work.phases) for work in works}
+    phases = min(names) if len(names) == 1 else ()
+    means = {phase: round(np.mean([work.phases[phase] for work in works])) for phase in phases}
+    return PlannedBatch(name, count, most, round(grains), round(spheres), round(steps), *time, means)

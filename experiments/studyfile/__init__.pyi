@@ -1,7 +1,7 @@
 """The public names: each is loaded with its module when it is first used."""
 
 from .conditions import Condition
-from .loading import BUCKWHEAT, load_card, load_study, study_scales
+from .loading import BUCKWHEAT, cheaper_study, load_card, load_study, study_scales
 from .new_study import write_template
 from .study import Study, StudyError
 
@@ -10,6 +10,7 @@ __all__ = [
     "Condition",
     "Study",
     "StudyError",
+    "cheaper_study",
     "load_card",
     "load_study",
     "study_scales",

@@ -183,6 +183,17 @@ class VerificationSettings(Section):
     """Level of the t-test and of each one-sided test."""
 
 
+class FidelitySettings(Section):
+    """A cheaper scale at which the design is run; a few runs move its surface to the study's own scale."""
+
+    scale: str
+    """Name of the cheaper ``[scale.NAME]``."""
+    runs: int = Field(default=12, ge=8, le=MOST)
+    """Runs at the study's own scale that move the surface."""
+    middle: int = Field(default=3, ge=2, le=MOST)
+    """Replicates there with every factor at its middle, which show the climb how far the scales are apart."""
+
+
 class CampaignSettings(Section):
     """The ``[campaign]`` section of a study."""
 
@@ -194,6 +205,8 @@ class CampaignSettings(Section):
     surface: SurfaceSettings = SurfaceSettings()
     optimum: OptimumSettings = OptimumSettings()
     verification: VerificationSettings = VerificationSettings()
+    fidelity: FidelitySettings | None = None
+    """Cheaper scale. Default: every case has the study's own scale."""
 
 
 TARGET_SCENE = "target"

@@ -80,7 +80,7 @@ def under_condition(
     fixed
         Names of the factors that have nothing left to vary.
     """
-    left_out = ("condition", "target", "response", "direct", "campaign")
+    left_out = ("condition", "target", "response", "direct", "candidate", "campaign")
     kept = {key: value for key, value in document.items() if key not in left_out}
     merged = merge(kept, condition.changes)
     factors = [free_of(condition, factor) for factor in merged.get("factor", [])]

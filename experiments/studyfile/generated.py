@@ -17,8 +17,9 @@ from pydantic import AfterValidator, Field, create_model, model_validator
 
 from dem_warp import Parameter
 from dem_warp.parameters import parameters_of
+from dem_warp.walls import Triangles
 from experiments.io.units import dimension_of_unit
-from experiments.studyfile.schema import Dimension, Section
+from experiments.studyfile.schema import BodyFile, Dimension, Section
 
 
 class EngineSection(Section):
@@ -60,6 +61,8 @@ def section_for(engine: type, base: type[EngineSection] = EngineSection) -> type
         kind = hints[each.name]
         if is_dataclass(kind):
             continue
+        if kind == Triangles | None:
+            kind = BodyFile
         if each.name in parameters:
             kind = _number(kind, parameters[each.name], base.plain_numbers)
         keys[each.name] = (kind, ... if each.default is MISSING else each.default)

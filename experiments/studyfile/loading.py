@@ -89,6 +89,26 @@ def build_study(document: dict[str, Any], places: Places) -> Study:
     return study
 
 
+def cheaper_study(study: Study, scale: str | None = None) -> Study:
+    """Return a study at the cheaper scale of its campaign, or at one that is named; without one, the study.
+
+    Raise StudyError when the study's file has no such scale, or other factors there.
+    """
+    fidelity = study.campaign.fidelity
+    if scale is None:
+        return study if fidelity is None else cheaper_study(study, fidelity.scale)
+    place = f"{study.file}: campaign.fidelity.scale"
+    if scale == study.scale:
+        raise StudyError(place, "must be another scale than that of the run", scale)
+    if study.engine is not None and study.engine.by is not None:
+        raise StudyError(place, "cannot be combined with runs by hand", scale)
+    engine = study.document.get("engine")
+    cheaper = load_study(study.file, scale, {"engine": engine} if engine else None)
+    if [factor.name for factor in cheaper.factors] != [factor.name for factor in study.factors]:
+        raise StudyError(place, "must have the study's factors", scale)
+    return cheaper
+
+
 def study_scales(path: str | Path | None = None) -> tuple[str, ...]:
     """Return the names of the scales of a study file."""
     path = BUCKWHEAT if path is None else Path(path)

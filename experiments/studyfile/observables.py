@@ -16,20 +16,27 @@ import numpy as np
 
 from dem_warp import LiftedCylinder
 from dem_warp.scenes.drum_surface import STATIONS
+from dem_warp.scenes.penetration import PARTS, PENETRATION_OBSERVABLES
+from dem_warp.scenes.press_curve import LOADED, UNLOADED
 from dem_warp.scenes.scene import Observable as Declared
+from dem_warp.scenes.shear_points import LOADS, SHEAR_OBSERVABLES
 
 if TYPE_CHECKING:
-    from imaging import HeapAngle, HeapShape, ReposeAngle
+    from imaging import HeapAngle, HeapReadings, HeapShape, ReposeAngle
 
-SURFACE_PROFILE, OUTLINE_PROFILE = "surface", "outline"
-"""Observables that are functions: the surface of the bed in a drum, the outline of a heap."""
+SURFACE_PROFILE, OUTLINE_PROFILE, CURVE_PROFILE = "surface", "outline", "stress_strain"
+"""Observables that are functions: a drum's surface, a heap's outline, strains of grains under a piston."""
+
+SHEAR_PROFILE, FORCE_PROFILE = "shear_points", "force_depth"
+"""Further ones: shear stresses against normal stresses, forces on a tool against its depth."""
 
 ANGLE = "angle"
 """Spelling of the repose angle in study files and tables of cases."""
 
 DIMENSIONS = {
     "1": "", "deg": "angle", "m": "length", "s": "time",
-    "kg": "mass", "kg/s": "mass flow", "kg/m^3": "density",
+    "kg": "mass", "kg/s": "mass flow", "kg/m^3": "density", "Pa": "pressure",
+    "N": "force", "J": "energy",
 }  # fmt: skip
 """Dimension of each unit that an observable may have, as quantities know it."""
 
@@ -47,6 +54,12 @@ class Instrument(StrEnum):
     """A film of the lift through a clear tube."""
     SCAN = "scan"
     """The heap's surface from all sides."""
+    PRESS = "press"
+    """A press with a load cell and a gauge of the piston's way."""
+    SHEAR_TESTER = "shear-tester"
+    """A Jenike, ring or rotational shear tester, or a shear box."""
+    PENETROMETER = "penetrometer"
+    """A tool with a load cell, for tip and shaft, and a gauge of its depth."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +83,13 @@ class View:
         from imaging import heap_profile
 
         return heap_profile(self.angle.outline)
+
+    @cached_property
+    def readings(self) -> HeapReadings:
+        """Angle of the outline in every usual reading."""
+        from imaging import heap_readings
+
+        return heap_readings(self.angle.outline)
 
 
 @dataclass(frozen=True)
@@ -229,17 +249,51 @@ OUTLINE = tuple(
 )
 """Heights of a heap's outline, its profile; a study asks for them (``[measurement] outline``)."""
 
+
+def _reading(name: str, view: View) -> float:
+    return float(getattr(view.readings, name))
+
+
+READINGS = tuple(
+    _photographed(name, title, "deg", rule, seen=partial(_reading, name))
+    for name, title, rule in (
+        ("line_angle", "angle of the whole flanks", "mean angle of lines through both whole flanks"),
+        ("middle_angle", "angle of the middle", "the same through 20 to 80 % of the height"),
+        ("height_angle", "angle from toe to apex", "atan of the outline's height over half its width"),
+        (
+            "centre_angle",
+            "angle by the centre of mass",
+            "angle of a cone of the outline's width whose centre of mass, at a quarter of its height, is as "
+            "high as that of the outline turned about the apex",
+        ),
+        (
+            "volume_angle",
+            "angle by the volume",
+            "angle of a cone of the outline's width with the volume of the outline turned about the apex",
+        ),
+    )
+)
+"""Other readings of a heap's angle, from the same picture: a response may name each of them."""
+
 NAMES = tuple(observable.name for observable in OBSERVABLES)
 """Their names."""
 
 PHOTOGRAPHED = tuple(observable.name for observable in OBSERVABLES if observable.by_photograph)
 """Names of those that a photograph shows."""
 
-BY_NAME = {name: each for each in (*OBSERVABLES, *OUTLINE) for name in (each.name, each.column)}
+BY_NAME = {name: each for each in (*OBSERVABLES, *READINGS, *OUTLINE) for name in (each.name, each.column)}
 """The same by name and by alias."""
 
-PROFILES = {SURFACE_PROFILE: SURFACE, OUTLINE_PROFILE: tuple(each.name for each in OUTLINE)}
-"""Heights of each profile that responses and files may ask for, by its name."""
+PROFILES = {
+    SURFACE_PROFILE: SURFACE,
+    OUTLINE_PROFILE: tuple(each.name for each in OUTLINE),
+    CURVE_PROFILE: tuple(f"strain_{number + 1}" for number in range(len(LOADED + UNLOADED))),
+    SHEAR_PROFILE: tuple(f"shear_stress_{number + 1}" for number in range(len(LOADS) + 1)),
+    FORCE_PROFILE: tuple(f"force_{number + 1}" for number in range(PARTS)),
+}
+"""Heights of each profile, strains, stresses or forces, that responses and files may ask for, by its name."""
+
+_PART_OF = {name: profile for profile, names in PROFILES.items() for name in names}
 
 SOLID_FRACTION, BULK_DENSITY = "solid_fraction", "bulk_density"
 """Observable of a filling, and the one that follows from it and the density of the grain."""
@@ -260,9 +314,35 @@ _INSTRUMENTS = {
     "s": Instrument.FILM,
     "kg": Instrument.BALANCE,
     "kg/s": Instrument.BALANCE,
+    "Pa": Instrument.PRESS,
     "1": Instrument.BALANCE,
 }
 """Instrument of each unit, in a test that leaves no heap."""
+
+PRESSED = ("pressed_density", "rebound", "base_share", "strain")
+"""Beginnings of the names of further observables of a press."""
+_FILMED = ("rebound_height", "rebound_restitution", "tangential_ratio", "speed_ratio")
+"""Observables of a test that leaves no heap that a film shows, whatever their unit."""
+
+
+def instrument_of(observable: Observable) -> Instrument:
+    """Return the instrument of an observable; where it names none, that of its unit."""
+    return observable.instrument or _instrument(observable.name, observable.unit)
+
+
+def _instrument(name: str, unit: str) -> Instrument:
+    if name in _FILMED:
+        return Instrument.FILM
+    if name == "run_friction":
+        return Instrument.RULER
+    if name in SHEAR_OBSERVABLES:
+        return Instrument.SHEAR_TESTER
+    if name in PENETRATION_OBSERVABLES:
+        return Instrument.PENETROMETER
+    if name.startswith(PRESSED):
+        return Instrument.PRESS
+    return _INSTRUMENTS.get(unit, Instrument.BALANCE)
+
 
 VERSION = 2
 """Version of the definitions; values measured by other ones are measured again."""
@@ -270,7 +350,8 @@ VERSION = 2
 
 def observables_of(declared: Mapping[str, Declared], leaves_a_heap: bool) -> dict[str, Observable]:
     """Collect what a scene declares and what pictures of its heap show, by columns in a table of cases."""
-    heap = {each.column: each for each in (*OBSERVABLES, *OUTLINE)} if leaves_a_heap else {}
+    pictured = (*OBSERVABLES, *READINGS, *OUTLINE)
+    heap = {each.column: each for each in pictured} if leaves_a_heap else {}
     others = {name: _plain(name, *facts) for name, facts in declared.items() if name not in heap}
     return heap | {each.name: each for each in filling(declared) if each is BULK} | others
 
@@ -293,15 +374,17 @@ def measurable(
     for the error, the spread or a side of another observable, whose name begins with that of the other.
     """
     if leaves_a_heap:
-        return (*OBSERVABLES, *(OUTLINE if outline else ()))
+        lacking = LiftedCylinder.observables.keys() - declared.keys()
+        given = tuple(each for each in OBSERVABLES if each.name not in lacking)
+        return (*given, *(OUTLINE if outline else ()))
     return tuple(
         Observable(
             name,
             name.replace("_", " "),
             unit,
             meaning,
-            _INSTRUMENTS[unit],
-            part_of=SURFACE_PROFILE if name in SURFACE else "",
+            _instrument(name, unit),
+            part_of=_PART_OF.get(name, ""),
         )
         for name, (unit, meaning) in declared.items()
         if name not in OF_THE_RUN and not any(name.startswith(f"{other}_") for other in declared)

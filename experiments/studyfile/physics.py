@@ -16,7 +16,7 @@ from pydantic import Field, field_validator, model_validator
 from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, PouredScene, ShapeMixture, WallPart
 from dem_warp.laws.mechanism import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
-from dem_warp.scenes.poured_scene import TooManyGrainsError
+from dem_warp.scenes.walled_scene import TooManyGrainsError
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.proportions import narrowness
@@ -271,7 +271,8 @@ class Physics(Section):
         size = grains.size_mean if grains.classes is None else grains.size_range[1]
         narrow = narrowness(getattr(scene, "diameter", None), grains.shape, size)
         densities = ((self.grain.density, "grain.density"), (self.wall.density, "wall.density"))
-        return tuple(filter(None, (narrow, *(density_doubt(*each) for each in densities))))
+        of_test = scene.doubts(grains, self.numerics.build().softened(grains.material))
+        return tuple(filter(None, (narrow, *(density_doubt(*each) for each in densities), *of_test)))
 
     def build_case(self, seed: int) -> Case:
         """Build one case of the engine; raise ValueError where it cannot be, e.g. `GrainCountError`."""
@@ -286,9 +287,10 @@ class Physics(Section):
             laws=self.solver.laws,
             wall_parts=self.wall_parts(),
         )
+        _check_supply(case)
         if isinstance(case.scene, PouredScene):
-            _check_supply(case)
             _check_opening(case)
+        case.scene.doubts(case.grains, case.grain_material)
         return case
 
     def wall_parts(self) -> tuple[WallPart, ...]:

@@ -17,7 +17,7 @@ LABELS = ("stage", "scene", "run", "replicate", "seed", "step", "piece", "direct
 RESULTS = ("status", "reason", "angle", "angle_se", "case_key", "rebuilds")
 """Columns that every table of cases gets, with the observables of its scene."""
 
-STATISTICS = ("predicted", "mean", "sd", "n", "error", "error_percent", "half_width", "span")
+STATISTICS = ("predicted", "mean", "sd", "n", "error", "error_percent", "span")
 """Columns of paths and directions."""
 
 DUMMY = "dummy"

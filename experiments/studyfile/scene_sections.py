@@ -7,8 +7,9 @@ from typing import Any, ClassVar, Self
 
 from pydantic import model_validator
 
-from dem_warp import SCENES, Material, PouredScene
+from dem_warp import SCENES, Material
 from dem_warp.scenes.scene import Observable
+from dem_warp.scenes.walled_scene import WalledScene
 from experiments.studyfile.generated import EngineSection, LibrarySection, library_section
 
 
@@ -30,7 +31,7 @@ class SceneSection(LibrarySection):
         return self
 
     @property
-    def kind(self) -> type[PouredScene]:
+    def kind(self) -> type[WalledScene]:
         """Class of the engine's scene."""
         [section] = self.given.values()
         return section.engine
@@ -44,7 +45,7 @@ class SceneSection(LibrarySection):
     def observables(self) -> Mapping[str, Observable]:
         return self.kind.observables
 
-    def scene(self, wall: Material) -> PouredScene:
+    def scene(self, wall: Material) -> WalledScene:
         """Build the engine's scene, its walls of a material."""
         [section] = self.given.values()
         return section.build(wall_material=wall)

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
+import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     GetCoreSchemaHandler,
     PlainValidator,
@@ -22,6 +24,8 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from dem_warp.solids import read_mesh
+from dem_warp.walls import Triangles
 from experiments.io.errors import Problem, StudyError
 from experiments.io.texts import nearest_name
 from experiments.io.units import Quantity, unit_size
@@ -83,6 +87,24 @@ RawQuantity = Annotated[Quantity, PlainValidator(Quantity.parse)]
 """A quantity of any dimension, kept as written."""
 StudyFile = Annotated[Path, AfterValidator(_existing)]
 """A file, relative to the study file."""
+
+MOST_TRIANGLES = 5000
+"""Triangles of the largest body: every case has them all."""
+
+
+def _read_body(value: object, info: ValidationInfo) -> object:
+    """Read a mesh file [mm] into triangles [m]; what is no path stays as it is."""
+    if not isinstance(value, str | Path):
+        return value
+    path = _existing(Path(value), info)
+    corners = np.round(read_mesh(path).triangles, 9)
+    if len(corners) > MOST_TRIANGLES:
+        raise ValueError(f"{path}: must have at most {MOST_TRIANGLES:,} triangles, got {len(corners):,}")
+    return tuple(map(tuple, corners.reshape(-1, 9).tolist()))
+
+
+BodyFile = Annotated[Triangles | None, BeforeValidator(_read_body)]
+"""Triangles of a mesh file, relative to the study file."""
 
 
 class Section(BaseModel):

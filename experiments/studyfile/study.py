@@ -19,7 +19,8 @@ from dem_warp import Case
 from doe import Factor
 from experiments.io.errors import StudyError
 from experiments.io.texts import nearest_name
-from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Direct, Target
+from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Direct, FidelitySettings, Target
+from experiments.studyfile.candidate_section import Candidate, CandidateSection, build_candidates
 from experiments.studyfile.cluster_section import ClusterSection
 from experiments.studyfile.conditions import BASE, Condition, Conditions, free_of
 from experiments.studyfile.direct_section import DirectSection, build_direct
@@ -95,6 +96,8 @@ class Study(Physics):
     """Further numbers to be matched."""
     direct_sections: tuple[DirectSection, ...] = Field(default=(), alias="direct")
     """Factors that were measured by themselves."""
+    candidate_sections: tuple[CandidateSection, ...] = Field(default=(), alias="candidate", max_length=20)
+    """Tests that could be done."""
     response_scenes: dict[str, Scene] = Field(default_factory=dict, alias="response-scene")
     """Further scenes, by the names that responses call them by."""
     factor_sections: tuple[FactorSection, ...] = Field(default=(), alias="factor")
@@ -135,7 +138,7 @@ class Study(Physics):
         """All of the study that its results depend on, its clumps included, as JSON-able data."""
         digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in self.grain.files]
         document = {key: value for key, value in self.document.items() if key != "cluster"}
-        tables = [section.file for section in self.direct_sections if section.file is not None]
+        tables = [each.file for each in self.direct_sections if each.file is not None]
         direct = [hashlib.sha256(table.read_bytes()).hexdigest() for table in tables]
         known = {"study": document, "scale": self.scale, "clump_sha256": digests}
         return known | ({"direct_sha256": direct} if direct else {})
@@ -162,7 +165,13 @@ class Study(Physics):
     @cached_property
     def direct(self) -> tuple[Direct, ...]:
         """Direct readings of factors, in the order of the file."""
-        return build_direct(self.direct_sections, self.factor_sections, self._titles, self._places)
+        given = self.target_section, self.campaign.seeds.target
+        return build_direct(self.direct_sections, self.factor_sections, self._titles, self._places, *given)
+
+    @cached_property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """Tests that could be done, in the order of the file."""
+        return build_candidates(self.candidate_sections, self.factor_sections, self.scenes, self._places)
 
     @property
     def _titles(self) -> list[str]:
@@ -206,9 +215,7 @@ class Study(Physics):
         if condition not in known:
             rule = f"must be a condition of the study, {nearest_name(condition, list(known))}"
             raise StudyError(str(self.file), rule, condition)
-        if not known[condition].changes:
-            return self
-        return self._under[condition]
+        return self._under[condition] if known[condition].changes else self
 
     def with_target(self, target: Target) -> Study:
         """Return the same study, whose cases must match something else."""
@@ -220,6 +227,12 @@ class Study(Physics):
         """Return the same study, whose cases another engine simulates: an ``[engine]`` as written."""
         section = validated(EngineSection, engine, self._places, ("engine",))
         return self._changed(self.document | {"engine": dict(engine)}, engine=section)
+
+    def with_fidelity(self, settings: Mapping[str, Any]) -> Study:
+        """Return the same study, whose design is run at a cheaper scale: the section as written."""
+        document = merge(self._document, {"campaign": {"fidelity": dict(settings)}})
+        section = validated(FidelitySettings, settings, self._places, ("campaign", "fidelity"))
+        return self._changed(document, campaign=self.campaign.model_copy(update={"fidelity": section}))
 
     def with_responses(
         self,
@@ -233,8 +246,7 @@ class Study(Physics):
         document["target"] = target.table
         if target.twin is not None:
             document["target"]["twin"] = self._document["target"]["twin"]
-        if sections:
-            document["response"] = [self._row(section) for section in sections]
+        document |= {"response": [self._row(section) for section in sections]} if sections else {}
         if measurement is not None:
             document["measurement"] = measurement.model_dump(exclude_unset=True)
         study = self._changed(
@@ -256,6 +268,8 @@ class Study(Physics):
     ) -> Study:
         """Return the same study with more factors, each in the place of the value that it varies.
 
+        Raise StudyError when the study cannot have the factors.
+
         Parameters
         ----------
         tables
@@ -264,11 +278,6 @@ class Study(Physics):
             Values by place, for places without a value in the study.
         solver
             Conventions of the contact law in place of the study's.
-
-        Raises
-        ------
-        StudyError
-            When the study cannot have the factors.
         """
         study = self._with_factors(tables, settings or {}, solver or self.solver)
         for name, condition in self.condition_sections.items():
@@ -321,6 +330,7 @@ class Study(Physics):
     def match(self) -> None:
         """Build the target of the responses."""
         self._check_names()
+        _ = self.candidates  # refuses wrong ones
         held_out = [condition.name for condition in self.conditions if condition.held_out]
         target, responses = self.target_section, self.response_sections
         self._target = build_target(target, responses, self.scenes, held_out, self._places)
@@ -386,5 +396,4 @@ def check_restitution(study: Study) -> None:
         if any(path[-1] == "restitution" for path in section.paths):
             damping = study.solver.laws.normal_damping
             problem = f"varies a restitution, which the damping {damping!r} ignores"
-            place = f"{study.file}: factor {section.name}"
-            raise StudyError(place, problem, hint="Remove the factor.")
+            raise StudyError(f"{study.file}: factor {section.name}", problem, hint="Remove the factor.")

@@ -46,9 +46,12 @@ class ViewSection(Section):
     distance: float | None = None
     """Distance of the camera from the heap, in widths of the heap; default: from the focal length."""
 
+    circle: tuple[float, float, float] | None = None
+    """Column, row and radius of a drum's inner edge, in pixels; default: found."""
+
     @property
     def view(self) -> View:
-        return View(self.crop, self.plate, self.heap, self.elevation, self.distance)
+        return View(self.crop, self.plate, self.heap, self.elevation, self.distance, circle=self.circle)
 
     @model_validator(mode="after")
     def _is_possible(self) -> ViewSection:
@@ -154,7 +157,8 @@ class TargetSection(ResponseSection):
     fit: str | None = None
     """Part of the flank that the measured angles were fitted to. Default: as ``[measurement]`` says."""
     pictures: str | None = None
-    """Photographs of the heaps, instead of numbers: a folder, or a pattern as ``"photos/*.jpg"``."""
+    """Photographs of the heaps, instead of numbers: a folder, or a pattern as ``"photos/*.jpg"``. Of a
+    rotating drum they give the observable ``"dynamic_angle"`` or the profile ``"surface"``."""
     by: Grouping = "picture"
     """Pictures of one heap: each picture is another heap, or each folder is one heap."""
     keep_doubtful: bool = False

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
 from imaging.drawing.render import Snapshot
+from imaging.drum.drum_reading import FITTED, DrumReading
 from imaging.flank.flank_line import FlankLine
+from imaging.flank.outline import Doubt
 from imaging.geometry import FloatArray, Picture
 from imaging.picture_error import PictureError
 from imaging.repose import ReposeAngle
@@ -28,8 +32,7 @@ def overlay(picture: Picture | Snapshot, angle: ReposeAngle) -> Picture:
     to each other. A `Snapshot` must have the scale of the measured one.
     """
     image = _same_scale(picture, angle).image if isinstance(picture, Snapshot) else picture
-    canvas: Picture = np.repeat(image[:, :, None], 3, axis=2) if image.ndim == 2 else image.copy()
-    unit = max(canvas.shape[1] / REFERENCE_WIDTH, 0.75)
+    canvas, unit = _canvas(image)
     outline = angle.outline
     ends = np.array([outline.position[0], outline.position[-1]])
     _stroke(canvas, _on_picture(angle, ends, np.zeros(2)), PLATE_COLOR, unit)
@@ -42,12 +45,41 @@ def overlay(picture: Picture | Snapshot, angle: ReposeAngle) -> Picture:
         _stroke(canvas, _on_picture(angle, *line.covered(outline)), OUTLINE_COLOR, 1.5 * unit)
         _stroke(canvas, stroke, LINE_COLOR, 2.5 * unit)
         _label(canvas, stroke.mean(axis=0), degrees, aside, unit)
-    if angle.doubts:
-        text = "doubtful: " + ", ".join(dict.fromkeys(doubt.name for doubt in angle.doubts))
-        _mark(canvas, text, unit, DOUBT_COLOR, 0)
+    _mark_doubts(canvas, angle.doubts, unit)
     if angle.correction:
         _mark(canvas, angle.correction, unit, PLATE_COLOR, 1)
     return canvas
+
+
+def overlay_drum(picture: Picture, drum: DrumReading) -> Picture:
+    """Draw the circle (grey), the surface (blue) and the slope (red) of a drum on a copy of its picture."""
+    canvas, unit = _canvas(picture)
+    circle, middle = drum.circle, np.array([drum.circle.column, drum.circle.row])
+    turns = np.linspace(0.0, 2.0 * np.pi, 181)
+    ring = np.column_stack([np.cos(turns), np.sin(turns)])
+    _stroke(canvas, middle + circle.radius * ring, PLATE_COLOR, unit)
+    points = drum.points()
+    _stroke(canvas, points, OUTLINE_COLOR, 1.5 * unit)
+    slope = np.radians(drum.dynamic_angle)
+    across = np.array([np.cos(slope) * (-1.0 if drum.surface.mirrored else 1.0), np.sin(slope)])
+    center = points.mean(axis=0)
+    line = center + FITTED * circle.radius * np.array([[-1.0], [1.0]]) * across
+    _stroke(canvas, line, LINE_COLOR, 1.5 * unit)
+    _label(canvas, center, drum.dynamic_angle, -1.0 if drum.surface.mirrored else 1.0, unit)
+    _mark_doubts(canvas, drum.doubts, unit)
+    return canvas
+
+
+def _canvas(image: Picture) -> tuple[Picture, float]:
+    """Return a copy to draw on in colours, and the thickness of a line of one unit [pixels]."""
+    canvas = np.repeat(image[:, :, None], 3, axis=2) if image.ndim == 2 else image.copy()
+    return canvas, max(canvas.shape[1] / REFERENCE_WIDTH, 0.75)
+
+
+def _mark_doubts(canvas: Picture, doubts: Sequence[Doubt], unit: float) -> None:
+    if doubts:
+        text = "doubtful: " + ", ".join(dict.fromkeys(doubt.name for doubt in doubts))
+        _mark(canvas, text, unit, DOUBT_COLOR, 0)
 
 
 def _mark(canvas: Picture, text: str, unit: float, color: tuple[int, int, int], at_bottom: int) -> None:

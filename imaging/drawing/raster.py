@@ -38,12 +38,13 @@ def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
     half_chord = np.sqrt(np.maximum(radii[sphere] ** 2 - (column + 0.5 - right[sphere]) ** 2, 0.0))
     first = np.clip(np.ceil(up[sphere] - half_chord - 0.5), 0, rows).astype(np.int64)
     last = np.clip(np.floor(up[sphere] + half_chord + 0.5), 0, rows).astype(np.int64)
-    size = (rows + 1) * columns
-    opened = np.bincount(first * columns + column, minlength=size)
-    closed = np.bincount(np.maximum(first, last) * columns + column, minlength=size)
-    depth_count = np.cumsum((opened - closed).reshape(rows + 1, columns)[:rows], axis=0)
-    mask = np.where(depth_count > 0, np.uint8(255), np.uint8(0))
-    return cv2.resize(mask, frame.shape[::-1], interpolation=cv2.INTER_AREA).astype(np.uint8)
+    # column after column: each closes all that it opens, so that one running sum serves them all
+    begin, size = column * (rows + 1), columns * (rows + 1)
+    depth_count = np.bincount(begin + first, minlength=size)
+    depth_count -= np.bincount(begin + np.maximum(first, last), minlength=size)
+    covered = np.cumsum(depth_count, out=depth_count).reshape(columns, rows + 1)[:, :rows] > 0
+    mask = covered.view(np.uint8) * np.uint8(255)
+    return np.ascontiguousarray(cv2.resize(mask, frame.shape, interpolation=cv2.INTER_AREA).T)
 
 
 def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture:

@@ -45,7 +45,7 @@ class HeapAngle:
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Return the confidence interval of the mean [degrees]."""
-        return confidence_interval(self, level)
+        return confidence_interval(self.mean, self.se, self.dof, level)
 
 
 @dataclass(frozen=True)

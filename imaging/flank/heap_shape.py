@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imaging.flank.camera_height import level_outline
-from imaging.flank.flank_line import apex_column
+from imaging.flank.fit_settings import FITS, FitSettings
+from imaging.flank.flank_line import apex_column, fit_flanks
 from imaging.flank.outline import Outline
 from imaging.geometry import FloatArray
 from imaging.picture_error import PictureError
@@ -39,6 +40,54 @@ class HeapShape:
     """(area right of the apex - area left of it) / area, -1 to 1."""
 
 
+@dataclass(frozen=True)
+class HeapReadings:
+    """Angle of a heap as each usual reading of one outline gives it [degrees]: equal for a cone alone."""
+
+    line_angle: float
+    middle_angle: float
+    """Mean angle of the lines fitted to both whole flanks, and to their middle, 20 to 80 % of the height."""
+    height_angle: float
+    """Angle from the toe to the apex: atan(height / half the width)."""
+    centre_angle: float
+    volume_angle: float
+    """Angle of the cone of the same width with the same height of the centre of mass, and with the same
+    volume, of the outline turned about the apex."""
+
+
+def heap_readings(outline: Outline, place: str = "outline") -> HeapReadings:
+    """Read the angle of an outline in every usual way, corrected for the camera's height.
+
+    Raises
+    ------
+    PictureError
+        When no line can be fitted to a flank; `place` names the outline.
+    """
+    level = level_outline(outline)
+    h, reach = level.height, 0.5 * _width(level)
+    ring = h * np.gradient(level.position) * _from_apex(level)
+    volume = np.pi * float(ring.sum())
+    center = 0.5 * float((ring * h).sum() / ring.sum())
+    tangents = float(h.max()) / reach, 4.0 * center / reach, 3.0 * volume / (np.pi * reach**3)
+    lines = (_line_angle(level, FITS[fit], place) for fit in ("flank", "middle"))
+    return HeapReadings(*lines, *map(float, np.degrees(np.arctan(tangents))))
+
+
+def _line_angle(level: Outline, fit: FitSettings, place: str) -> float:
+    return float(np.mean([line.angle for line in fit_flanks(level, fit, place)]))
+
+
+def _width(level: Outline) -> float:
+    """Width from end to end, the last column included."""
+    return float(np.ptp(level.position) + np.gradient(level.position).mean())
+
+
+def _from_apex(level: Outline) -> FloatArray:
+    """Distance of each column from the apex."""
+    x, apex = level.position, apex_column(level.position, level.height)
+    return np.abs(x - 0.5 * (x[apex - 1] + x[apex]))
+
+
 def heap_shape(outline: Outline) -> HeapShape:
     """Measure the shape of an outline (see `find_outline`), corrected for the camera's height."""
     level = level_outline(outline)
@@ -46,9 +95,9 @@ def heap_shape(outline: Outline) -> HeapShape:
     scale = outline.meters_per_pixel or 1.0
     step = np.gradient(x)
     apex = apex_column(x, h)
-    radius = np.abs(x - 0.5 * (x[apex - 1] + x[apex]))
+    radius = _from_apex(level)
     left, right = float((h * step)[:apex].sum()), float((h * step)[apex:].sum())
-    width, height = float(x[-1] - x[0] + step.mean()), float(h.max())
+    width, height = _width(level), float(h.max())
     r50, r90 = _volume_radii(radius, h * step * radius, (0.5, 0.9))
     return HeapShape(
         height=height * scale,

@@ -22,8 +22,8 @@ HIGHER_SIDE = 0.25
 THIN = 4.0
 """Columns up to this height [pixels] are measured by their area."""
 DOUBTS = (
-    "lean", "error", "range", "elevation", "straightness", "foot", "step", "ends",
-    "tilt", "border", "plate", "threshold", "shade",
+    "lean", "error", "range", "elevation", "distance", "straightness", "foot", "step", "ends",
+    "tilt", "border", "plate", "threshold", "shade", "rim", "surface",
 )  # fmt: skip
 """Names of all doubts, in an angle or in the outline that it was fitted to."""
 
@@ -63,10 +63,17 @@ class Outline:
     """Angle at which the camera looked down on the plate, and its standard error [degrees]."""
     distance: float | None = None
     """Distance from the camera to the heap, in widths of the heap, where it is known."""
+    nearest: float | None = None
+    """Least distance that the camera may have had, in widths of the heap, where only that is known."""
     photographed: bool = False
     """True for a photograph, False for a drawn silhouette, whose angle is never doubted."""
     doubts: tuple[Doubt, ...] = ()
     """Doubts about the outline; empty for a drawn silhouette."""
+
+    @property
+    def likely_distance(self) -> float | None:
+        """Distance, or where only the least one is known, one that is as wrong nearby as far away."""
+        return 2.0**0.5 * self.nearest if self.distance is None and self.nearest else self.distance
 
     def in_part(self, left: int, top: int) -> Outline:
         """Return the outline in a part of the picture that begins at this column and row."""

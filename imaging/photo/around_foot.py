@@ -10,7 +10,6 @@ from imaging.flank.outline import Doubt
 from imaging.flank.plate_line import PLATE_CLEARANCE, PlateLine
 from imaging.geometry import FloatArray, Layer
 from imaging.photo.background import Contrast, unshaded
-from imaging.photo.doubts import END_WIDTH, LEAST_END
 from imaging.picture_error import PictureError
 
 DEEP_FOOT = 0.05
@@ -23,8 +22,6 @@ SIDE_NOISE, SIDE_DIFFERENCE = 6.0, 24.0
 FADED = 0.7
 """Darkness a tenth of a heap's width below its foot over that at its foot: a shadow has less (good heaps seen
 from above up to 0.65), a dish 1."""
-LOW_END = 0.08
-"""Height of an outline's lower end over the heap's, above which its ground may be a board's underside."""
 
 
 @dataclass(frozen=True)
@@ -58,30 +55,6 @@ def without_strays(found: FoundHeap) -> FoundHeap:
     kept = np.zeros(len(height), dtype=np.bool_)
     kept[first:last] = True
     return replace(found, rows=np.where(kept, found.rows, np.nan))
-
-
-def doubted_on_board(seen: Contrast, found: FoundHeap) -> FoundHeap:
-    """Doubt a heap with two high ends on a band that differs from what is above it.
-
-    A board seen a little from above may look like this: its ends slant, so its underside is taken for the
-    ground, and its ends for the feet of the flanks.
-    """
-    position, height = found.plate.level(*found.edge())
-    size = max(3, round(END_WIDTH * len(height)))
-    end = float(min(np.median(height[:size]), np.median(height[-size:])))
-    share = end / max(float(height.max()), 1.0)
-    if share <= LOW_END or end <= LEAST_END:
-        return found
-    across = float(position.min()) + np.linspace(0.3, 0.7, 60) * float(np.ptp(position))
-    band, above = (
-        _sampled(seen, found.plate, across, end * np.linspace(*part, 8)) for part in ((0.25, 0.7), (1.4, 2.0))
-    )
-    if band is None or above is None:
-        return found
-    if float(np.linalg.norm(np.median(band, axis=0) - np.median(above, axis=0))) <= least_difference(seen):
-        return found
-    finding = f"both ends are {share:.2f} heights high, and of another colour than above: a board?"
-    return replace(found, doubts=(*found.doubts, Doubt("plate", finding)))
 
 
 def refuse_narrow_base(seen: Contrast, found: FoundHeap, ends: tuple[float, float], place: str) -> None:

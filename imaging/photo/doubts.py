@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from imaging.flank.camera_height import near_change
 from imaging.flank.flank_line import MINIMUM_FLANK_COLUMNS, FlankLine
 from imaging.flank.outline import Doubt, Outline
 from imaging.geometry import FloatArray
@@ -23,6 +24,8 @@ LARGEST_TILT = 12.0
 """Tilt with a visible plate [degrees]."""
 LARGEST_ELEVATION = 12.0
 """Angle at which the camera looks down [degrees] whose effect is corrected (2.3 degrees on a heap of 20)."""
+LARGEST_NEAR_CHANGE = 2.0
+"""Change of the angle if the camera had the widest usual lens [degrees], where its distance is unknown."""
 LARGEST_MISFIT = 0.06
 """Root mean square of the outline's shape about its two lines, over its height: heaps of twenty grains across
 have up to 0.055, a parabola 0.069, half a circle 0.075."""
@@ -78,6 +81,10 @@ def doubts_of(
     if outline.elevation > LARGEST_ELEVATION:
         finding = f"the camera looks down by {outline.elevation:.0f} degrees, over {LARGEST_ELEVATION:g}"
         yield Doubt("elevation", finding)
+    nearer = near_change(0.5 * (left.angle + right.angle), outline)
+    if abs(nearer) > LARGEST_NEAR_CHANGE:
+        finding = f"{nearer:+.1f} degrees if the camera was {outline.nearest:.1f} heap widths away"
+        yield Doubt("distance", f"{finding}, over {LARGEST_NEAR_CHANGE:g}: give its distance")
     misfit = relative_misfit(left, right, outline)
     if misfit > LARGEST_MISFIT:
         finding = f"the flanks deviate from their lines by {misfit:.3f} heights, over {LARGEST_MISFIT:g}"

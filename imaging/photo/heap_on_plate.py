@@ -20,7 +20,7 @@ from imaging.flank.outline import (
 )
 from imaging.flank.plate_line import PlateLine, find_plate
 from imaging.geometry import FloatArray, Layer
-from imaging.photo.around_foot import FoundHeap, doubted_on_board, least_difference
+from imaging.photo.around_foot import FoundHeap, least_difference
 from imaging.photo.background import Contrast
 from imaging.photo.doubts import LARGEST_UNSEEN_TILT
 from imaging.photo.foot import Base, below_plate, front_of_base, is_lowest_row, joined_foot
@@ -80,8 +80,7 @@ def _located(seen: Contrast, threshold: float, given: PlateLine | None, view: Vi
         front = near & (contrast > threshold)
         plate, body, heap = _on_plate(front, seen, threshold, given, view, place)
         rows = refine_thin(top_edge(heap, contrast, threshold), heap, contrast, plate)
-        found = _seen_whole(rows, body, plate, contrast, threshold, view, place)
-        return found if given is not None else doubted_on_board(seen, found)
+        return _seen_whole(rows, body, plate, contrast, threshold, view, place)
     if given is not None:
         return _on_given_plate(seen, threshold, plate, body, heap, view, place)
     return _on_seen_plate(seen, threshold, plate, body, heap, view, place)

@@ -6,6 +6,7 @@ A large picture is searched on a reduced copy; the edge found there is refined a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import cv2
@@ -26,7 +27,7 @@ from imaging.photo.around_foot import (
 )
 from imaging.photo.background import Contrast, contrast_with_background
 from imaging.photo.contrast_variants import (
-    with_filled_gaps,
+    cut_out,
     with_low_threshold,
     without_board,
     without_shadows,
@@ -63,6 +64,10 @@ AS_GOOD = 1.3
 """Factor within which misfits are equal: two thresholds on one heap differ by as much."""
 LEAST_STEP = 15.0
 """Smallest difference of colours [of 255] across an edge that is refined."""
+LARGEST_OTHER = 1.25
+"""Change of the mean with the way to find the outline [degrees]."""
+SIDE_HEIGHT = 0.15
+"""Part of the height from which on a heap's width is measured: a plate and single grains are lower."""
 SEARCHED_PIXELS = 800_000
 """Size of the copy on which a larger picture is searched [pixels]."""
 
@@ -77,8 +82,6 @@ def photographed_outline(picture: Picture, view: View, meters_per_pixel: float |
     found = find_heap(small, given, view, place)
     if view.elevation is not None:
         found = replace(found, elevation=view.elevation, elevation_se=0.0)
-    elif found.elevation > LEAST_CHECKED and not found.doubts:
-        found = replace(found, doubts=_doubt_of_elevation(found, small, given, view, place))
     columns, rows = found.edge()
     plate = found.plate
     if factor > 1:
@@ -87,6 +90,7 @@ def photographed_outline(picture: Picture, view: View, meters_per_pixel: float |
         plate = replace(plate, row=row)
     plate = replace(plate, row=plate.row - plate.slope * left + top)
     position, height = levelled(columns + left, rows + top, plate, place)
+    width = float(np.ptp(position[height > SIDE_HEIGHT * height.max()])) / (1.0 - SIDE_HEIGHT)
     return Outline(
         position,
         height,
@@ -94,32 +98,11 @@ def photographed_outline(picture: Picture, view: View, meters_per_pixel: float |
         meters_per_pixel,
         elevation=found.elevation,
         elevation_se=found.elevation_se,
-        distance=view.distance_of(float(np.ptp(position))),
+        distance=view.distance_of(width),
+        nearest=view.nearest_of(width),
         photographed=True,
         doubts=found.doubts,
     )
-
-
-LEAST_CHECKED, LOWER, LARGEST_CHANGE = 3.0, 1.0, 0.5
-"""Angle at which the camera looks down that is checked, how much lower it is taken then, and the change of
-the angle with that [degrees]: 0.43 at most in 33 rendered heaps that were not doubted before."""
-
-
-def _doubt_of_elevation(
-    found: FoundHeap, picture: Picture, given: PlateLine | None, view: View, place: str
-) -> tuple[Doubt, ...]:
-    """Doubt the angle where a camera a degree lower shows another one: a part of the foot was missed."""
-    elevation = found.elevation - LOWER
-    try:
-        lower = find_heap(picture, given, replace(view, elevation=elevation), place)
-        lower = replace(lower, elevation=elevation)
-        shift = abs(_candidate(lower, place).mean - _candidate(found, place).mean)
-    except PictureError:
-        return ()
-    if shift <= LARGEST_CHANGE:
-        return ()
-    finding = f"the angle changes by {shift:.2g} degrees if the camera looks down {LOWER:g} degree less"
-    return (Doubt("elevation", f"{finding}, over {LARGEST_CHANGE:g}"),)
 
 
 def _refined(
@@ -179,7 +162,38 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
     disagree about it.
     """
     seen = contrast_with_background(picture, place, np.float32)
-    best, finding = _best_seen(seen, given, view, place)
+    cut = _cut_out(seen, view, place) if given is None and view.heap is None else None
+    try:
+        found = _judged(seen, *_best_seen(seen, given, view, place), given, view, place)
+    except PictureError:
+        if cut is None:
+            raise
+        return cut
+    if cut is None or cut.doubts or found.doubts:
+        return found if cut is None or cut.doubts else cut
+    shift = abs(_candidate(cut, place).mean - _candidate(found, place).mean)
+    if shift <= LARGEST_OTHER:
+        return found
+    finding = f"cut out in another way, the angle changes by {shift:.1f} degrees, over {LARGEST_OTHER:g}"
+    return replace(found, doubts=(Doubt("threshold", finding),))
+
+
+def _cut_out(seen: Contrast, view: View, place: str) -> FoundHeap | None:
+    """Return the only thing cut out that is a heap, without another doubt than a high camera's."""
+    heaps = []
+    for piece in cut_out(seen):
+        for each in _candidates(piece, None, view, place)[0]:
+            with suppress(PictureError):
+                heap = _judged(seen, each, "", None, view, place)
+                heaps.append(replace(heap, doubts=(*heap.doubts, *each.doubts)))
+    sure = [heap for heap in heaps if {doubt.name for doubt in heap.doubts} <= {"elevation"}]
+    return sure[0] if len(sure) == 1 else None
+
+
+def _judged(
+    seen: Contrast, best: Candidate, finding: str, given: PlateLine | None, view: View, place: str
+) -> FoundHeap:
+    """Doubt the best candidate by what is around it, or refuse it."""
     if best.crooked > NO_HEAP:
         finding = f"an outline that deviates from two lines by {best.crooked:.2f} of its height"
         raise PictureError(place, "no heap: two straight flanks must meet at its tip", finding)
@@ -213,13 +227,10 @@ def _best_seen(seen: Contrast, given: PlateLine | None, view: View, place: str) 
     candidates, errors = _candidates(with_low_threshold(seen), given, view, place)
     plain = [each for each in candidates if each.clear]
     best = _first_of_best(candidates)
-    filled: list[Candidate] = []
     if best is None or not best.steady(plain) or best.crooked > CROOKED:
-        shadowless, _ = _candidates(without_shadows(seen), given, view, place)
-        others = list(shadowless)
+        others = _candidates(without_shadows(seen), given, view, place)[0]
         if best is None or not best.clear or best.crooked > CROOKED or best.shift(plain) > LARGEST_SHIFT:
-            filled, _ = _candidates(with_filled_gaps(seen), given, view, place)
-            others += filled + _candidates(without_board(seen), given, view, place)[0]
+            others += _candidates(without_board(seen), given, view, place)[0]
             if best is None:
                 others = [each for each in others if each.clear]
             if best is None or best.clear or any(len(other.doubts) < len(best.doubts) for other in others):
@@ -229,32 +240,10 @@ def _best_seen(seen: Contrast, given: PlateLine | None, view: View, place: str) 
                 raise errors[0]
         else:
             candidates = candidates + others
-        if best.clear and best.shift(candidates) > LARGEST_SHIFT:
-            best, candidates = _without_its_shadow(best, plain, shadowless, candidates)
-    if any(best is each for each in filled) and not best.confirmed(candidates):
-        return best, "no other threshold shows this heap: some grains are as light as the wall"
     shift = best.shift(candidates)
     if shift > LARGEST_SHIFT:
         return best, f"the angle changes by {shift:.1f} degrees with the threshold, over {LARGEST_SHIFT:g}"
     return best, ""
-
-
-def _without_its_shadow(
-    best: Candidate, plain: list[Candidate], shadowless: list[Candidate], candidates: list[Candidate]
-) -> tuple[Candidate, list[Candidate]]:
-    """Return the best candidate and those it must agree with, where only a shadow moves the edge.
-
-    This is so where both thresholds without shadows show one edge, and one of the plain candidates shows it
-    too, or there is only one of these.
-    """
-    if len(shadowless) < 2 or not all(each.clear for each in shadowless):
-        return best, candidates
-    firm = min(shadowless, key=lambda each: each.misfit)
-    if firm.shift(shadowless) > LARGEST_SHIFT or firm.misfit > max(NEARLY * best.misfit, WELL):
-        return best, candidates
-    if len(plain) > 1 and not any(firm.like(each) for each in plain):
-        return best, candidates
-    return best if firm.like(best) else firm, shadowless
 
 
 def _without_sharp_shadow(
@@ -328,15 +317,11 @@ class Candidate:
         """Return True if the angles are equal within the change that a threshold may make."""
         return abs(other.mean - self.mean) <= LARGEST_SHIFT
 
-    def confirmed(self, others: Sequence[Candidate]) -> bool:
-        """Return True if another one, doubtful or not, has about the same angle."""
-        return any(self.like(other) for other in others if other is not self)
-
     def steady(self, others: Sequence[Candidate]) -> bool:
         """Return True if there is no doubt, a distant threshold confirms it, and none of `others` differs."""
         low, high = self.threshold / APART, self.threshold * APART
         away = [other for other in others if not low < other.threshold < high]
-        return self.clear and self.confirmed(away) and self.shift(others) <= LARGEST_SHIFT
+        return self.clear and any(map(self.like, away)) and self.shift(others) <= LARGEST_SHIFT
 
     def shift(self, others: Sequence[Candidate]) -> float:
         """Return the greatest change of the angle [degrees] among others without doubts that fit well."""

@@ -35,6 +35,10 @@ FILM_DIAGONAL = math.hypot(36.0, 24.0)
 """Diagonal of the 35 mm film that cameras' focal lengths are converted to [mm]."""
 FOCAL_LENGTH_TAG, WIDTH_TAG, HEIGHT_TAG, CAMERA_TAGS = 0xA405, 0xA002, 0xA003, 0x8769
 """EXIF tags: focal length on 35 mm film [mm], width and height of the picture as taken, their table."""
+FRAMES, FRAME_ERROR = (4 / 3, 3 / 2, 16 / 9), 0.01
+"""Longer over shorter side of cameras' pictures, and its relative error; pictures cut by hand have others."""
+WIDEST = 0.635
+"""Focal length over the longer side of the widest usual cameras: 22 mm on film; phones have 23 to 28."""
 BROKEN = (OSError, ValueError, TypeError, SyntaxError)
 """Errors of Pillow on a file that it cannot read; an unidentified image is an OSError."""
 
@@ -179,6 +183,13 @@ def focal_length(path: str | Path) -> float | None:
     if not (5.0 <= film <= 2000.0) or taken != size:
         return None
     return film / FILM_DIAGONAL * math.hypot(*size)
+
+
+def least_focal_length(size: tuple[int, ...]) -> float | None:
+    """Return the least focal length [pixels] of the camera of a whole picture; None if it was cut."""
+    longer, shorter = max(size), min(size)
+    whole = any(abs(longer / shorter - frame) < FRAME_ERROR * frame for frame in FRAMES)
+    return WIDEST * longer if whole else None
 
 
 def save_picture(path: str | Path, image: Picture) -> Path:

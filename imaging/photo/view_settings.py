@@ -26,12 +26,18 @@ class View:
     """Distance of the camera from the heap, in widths of the heap; default: from the focal length."""
     focal_length: float | None = None
     """Focal length of the camera [pixels]; default: the camera was far away."""
+    least_focal_length: float | None = None
+    """Least focal length that the camera may have, where its own is unknown [pixels]; default: see there."""
+    circle: tuple[float, float, float] | None = None
+    """Column, row and radius of the inner edge of a drum, instead of a heap's facts [pixels]."""
 
     def __post_init__(self) -> None:
         if self.crop is not None and not (
             0 <= self.crop[0] < self.crop[2] and 0 <= self.crop[1] < self.crop[3]
         ):
             raise PictureError("crop", "must have 0 <= left < right and 0 <= top < bottom", self.crop)
+        if self.circle is not None and not self.circle[2] > 0.0:
+            raise PictureError("circle", "must have a positive radius", self.circle)
         if self.plate is not None and not self.plate[0] < self.plate[2]:
             raise PictureError("plate", "must have x1 < x2: a line from left to right", self.plate)
         if self.heap is not None and self.heap < 1:
@@ -46,6 +52,11 @@ class View:
         if self.distance is None and self.focal_length is not None and width > 0.0:
             return max(self.focal_length / width, LEAST_DISTANCE)
         return self.distance
+
+    def nearest_of(self, width: float) -> float | None:
+        """Return the least distance [heap widths] to a heap of this width [pixels]; None if unknown."""
+        known = self.least_focal_length is None or self.distance_of(width) is not None
+        return None if known else max((self.least_focal_length or 0.0) / width, LEAST_DISTANCE)
 
     def inside(self, shape: tuple[int, ...], place: str) -> tuple[slice, slice]:
         """Return rows and columns of the part to look at; raise `PictureError` if it is outside."""

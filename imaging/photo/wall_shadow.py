@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from imaging.flank.plate_line import PlateLine
 from imaging.geometry import FloatArray, Layer
-from imaging.photo.background import LEAST_NOISE, Contrast, otsu_threshold, unevenness
+from imaging.photo.background import LEAST_NOISE, Contrast, inner, otsu_threshold, unevenness
 
 DARKEST, LIGHTEST = 0.2, 0.95
 """Share of the light in a sharp shadow; lighter shadows hardly differ from the wall."""
@@ -114,12 +114,12 @@ def _like_wall(seen: Contrast, width: int) -> NDArray[np.bool_]:
 def _dimming(seen: Contrast) -> Layer:
     """Share of the wall's light at each pixel, as far as its colour is the wall's."""
     own = seen.background
-    power = np.maximum(np.einsum("ijk,ijk->ij", own, own), LEAST_NOISE)
-    return np.asarray(np.einsum("ijk,ijk->ij", seen.colors, own) / power)
+    power = np.maximum(inner(own, own), LEAST_NOISE)
+    return np.asarray(inner(seen.colors, own) / power)
 
 
 def _distance(difference: Layer) -> Layer:
-    return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", difference, difference)))
+    return np.asarray(np.sqrt(inner(difference, difference)))
 
 
 def _calm(colors: Layer, width: int) -> Layer:

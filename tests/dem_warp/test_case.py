@@ -7,7 +7,16 @@ import pytest
 from worlds import BALL, BOOT, GRAIN, PYRAMID, STEEL, small_case
 
 import dem_warp
-from dem_warp import RELATIVE, GrainPopulation, Interaction, Numerics, ShapeMixture, SizeClasses, WallPart
+from dem_warp import (
+    RELATIVE,
+    GrainPopulation,
+    Interaction,
+    LiftedCylinder,
+    Numerics,
+    ShapeMixture,
+    SizeClasses,
+    WallPart,
+)
 from dem_warp.laws.linear_cohesion import LinearCohesion
 
 
@@ -48,6 +57,8 @@ OTHER = {
     "tilt": 0.1,
     "vibration_amplitude": 1e-4,
     "air_drag": 1.0,
+    "rate": "auto",
+    "lip": 1e-3,
     "seed": 2,
     "modulus_scale": 200.0,
     "classes": SizeClasses((0.95, 1.05), (0.5, 0.5)),
@@ -58,9 +69,10 @@ OTHER = {
 
 
 def test_every_parameter_but_the_skin_is_part_of_a_case_s_identity():
-    case = small_case()
+    scene = LiftedCylinder(0.016, 0.016, STEEL, plate_diameter=0.05)
+    case = small_case(scene=scene)
     known = json.dumps(case.to_dict(), sort_keys=True)
-    assert json.dumps(small_case().to_dict(), sort_keys=True) == known
+    assert json.dumps(small_case(scene=scene).to_dict(), sort_keys=True) == known
     places = dict(leaves(case))
     assert len(places) > 25
     for place, value in places.items():

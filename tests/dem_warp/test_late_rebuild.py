@@ -8,7 +8,7 @@ from worlds import PYRAMID, SMALL_TUBE, assert_same_result, run_batch, small_cas
 
 from dem_warp import Case, batch, simulate, solver
 from dem_warp.rollback import Rollback
-from dem_warp.scenes.poured_scene import default_skin
+from dem_warp.scenes.walled_scene import default_skin
 from dem_warp.types import CheckRate
 
 FEW = replace(SMALL_TUBE, grain_count=24)

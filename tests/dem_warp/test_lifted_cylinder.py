@@ -140,7 +140,7 @@ def end_of_lift(riding: int) -> tuple[Decision, Decision, float]:
         positions[:riding, 2] += rise
         step = round(time / setup.time_step)
         overview = [each.item() for each in overviews(positions[None], rest[None], alive[None])]
-        view = WorldView(step, time, alive, alive, positions, rest, setup.masses, 0.0, *overview)
+        view = WorldView(step, time, alive, alive, positions, rest, setup.masses, np.zeros((1, 3)), *overview)
         decision = controller.look(view)
         if decision.remove is not None:
             alive[decision.remove] = False

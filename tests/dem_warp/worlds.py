@@ -120,7 +120,7 @@ def world(
     skin: float = 2e-3,
     speed_limit: float = 20.0,
     domain: tuple[tuple[float, float, float], tuple[float, float, float]] = BOX,
-    weighed: int | None = 0,
+    weighed: tuple[int, ...] = (0,),
     laws: ContactLaws = EDEM,
 ) -> WorldSetup:
     """Build a world in which one contact holds for grains and walls alike, with at least two walls."""

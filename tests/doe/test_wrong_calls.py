@@ -92,7 +92,7 @@ RIGHT_VALUES: list[tuple[Any, str]] = [
     ({}, "emulators Mixture.lower"),
     ([CURVE], "curves"),
     ([[[1.0], [2.0]]] * 2, "heaps"),
-    ([[0.0, 0.0, 0.0]], "evaluate.coded"),
+    ([[0.0, 0.0, 0.0]], "evaluate.coded cells made"),
     (list("abc"), "settings strata groups"),
     (["x", "y"], "components"),
     ({"x": 0.1}, "lower"),

@@ -1,14 +1,14 @@
 """Campaigns on analytic heaps: the angle is a function of the settings, with noise from the case's seed."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from doe import Factor
-from experiments.studyfile import Study
+from experiments.studyfile import Study, load_study
 from experiments.studyfile.campaign import CampaignSettings, Direct, Target
 
 Angle = Callable[[Mapping[str, float]], float]
@@ -103,3 +103,12 @@ def study_with(study: Study, companion: str | None = None, **campaign: Mapping) 
     settings = CampaignSettings.model_validate(study.campaign.model_dump() | campaign)
     update = {"campaign": settings}
     return study.model_copy(update=update if companion is None else update | {"companion": companion})
+
+
+def twin_of_one_angle() -> Study:
+    """Return the bench study with the angle as its only response, and without readings."""
+    study = load_study(None, "bench")
+    alone = study.with_target(replace(study.target, responses=study.target.responses[:1]))
+    return study_with(
+        alone.model_copy(update={"direct_sections": (), "direct": ()}), selection={"keep": ("E", "F")}
+    )

@@ -31,6 +31,10 @@ SIDES = np.array(
 TRIANGLES = BOX[SIDES]
 
 
+FAR = "angle --distance 100"
+"""The pictures are drawn from far away; one whose camera may be near is doubted."""
+
+
 @dataclass(frozen=True)
 class Brought:
     """A command on a file, and its answer."""
@@ -63,6 +67,12 @@ def dump(columns: str, rows: np.ndarray, bounds: np.ndarray, kind: str = "ff ff 
     body = "".join(" ".join(f"{value:.9g}" for value in row) + "\n" for row in rows)
     count = f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{len(rows)}\n"
     return f"{head}{count}ITEM: BOX BOUNDS {kind}\n{box}ITEM: ATOMS {columns}\n{body}"
+
+
+@cache
+def slope_of_cone() -> float:
+    """Measure the angle of the cone of spheres [degrees]."""
+    return heap_angle(*cone()).mean
 
 
 BOUNDS = np.array([[-0.15, 0.25], [-0.12, 0.2], [-0.01, 0.11]])
@@ -135,10 +145,10 @@ def points() -> str:
 @cache
 def photographed() -> Image.Image:
     """Draw a brown cone in front of a light wall, with the noise of a camera."""
-    picture = np.full((600, 900, 3), 235, dtype=np.uint8)
-    tip = 450 - round(250 * np.tan(np.radians(SLOPE)))
-    cv2.fillPoly(picture, [np.array([[200, 450], [450, tip], [700, 450]])], (90, 60, 40))
-    picture[450:] = 120
+    picture = np.full((400, 600, 3), 235, dtype=np.uint8)
+    tip = 300 - round(170 * np.tan(np.radians(SLOPE)))
+    cv2.fillPoly(picture, [np.array([[130, 300], [300, tip], [470, 300]])], (90, 60, 40))
+    picture[300:] = 120
     noise = np.random.default_rng(5).normal(0.0, 4.0, picture.shape)
     return Image.fromarray(np.clip(picture + noise, 0, 255).astype(np.uint8))
 
@@ -258,16 +268,16 @@ CASES: Mapping[str, Brought] = {
     "quadrangles": Brought("a.obj", quads, command=CLUMP),
     "a binary STL that begins with solid": Brought("a.stl", binary_stl, command=CLUMP),
     # pictures
-    "a GIF called PNG": Brought("a.png", saved("GIF"), source="opencv/opencv#21835"),
-    "a turned PNG": Brought("a.png", saved("PNG", turned=True), source="opencv/opencv#16579"),
-    "a turned TIFF": Brought("a.tif", saved("TIFF", turned=True), source="opencv/opencv#10703"),
-    "a turned JPEG": Brought("a.jpg", saved("JPEG", turned=True), source="opencv/opencv#8172"),
-    "a JPEG for printing": Brought("a.jpg", saved("JPEG", "CMYK")),
-    "a PNG with transparency": Brought("a.png", saved("PNG", "RGBA")),
-    "a grey TIFF": Brought("a.tif", saved("TIFF", "L")),
-    "a WebP": Brought("a.webp", saved("WEBP")),
+    "a GIF called PNG": Brought("a.png", saved("GIF"), command=FAR, source="opencv/opencv#21835"),
+    "a turned PNG": Brought("a.png", saved("PNG", turned=True), command=FAR, source="opencv/opencv#16579"),
+    "a turned TIFF": Brought("a.tif", saved("TIFF", turned=True), command=FAR, source="opencv/opencv#10703"),
+    "a turned JPEG": Brought("a.jpg", saved("JPEG", turned=True), command=FAR, source="opencv/opencv#8172"),
+    "a JPEG for printing": Brought("a.jpg", saved("JPEG", "CMYK"), command=FAR),
+    "a PNG with transparency": Brought("a.png", saved("PNG", "RGBA"), command=FAR),
+    "a grey TIFF": Brought("a.tif", saved("TIFF", "L"), command=FAR),
+    "a WebP": Brought("a.webp", saved("WEBP"), command=FAR),
     "a web page called JPEG": Brought("a.jpg", lambda: "<html>404 Not Found</html>", ("is a web page",)),
-    "half a JPEG": Brought("a.jpg", lambda: saved("JPEG")()[:9000], ("damaged or cut off",)),
+    "half a JPEG": Brought("a.jpg", lambda: saved("JPEG")()[:5000], ("damaged or cut off",)),
     "a video": Brought("a.mp4", lambda: b"\0\0\0\x18ftypmp42" + bytes(999), ("is a video", "Save one frame")),
     "a PDF": Brought("a.pdf", lambda: b"%PDF-1.5\n\xff\xfe" + bytes(999), ("is a PDF", "Save its picture")),
     # studies
@@ -286,6 +296,7 @@ CASES: Mapping[str, Brought] = {
 }
 
 
+@pytest.mark.usefixtures("_coarse_clumps")
 @pytest.mark.parametrize("name", CASES)
 def test_what_people_bring_is_answered(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case = CASES[name]
@@ -304,10 +315,10 @@ def test_what_people_bring_is_answered(name: str, tmp_path: Path, monkeypatch: p
             mean = float(out.rpartition("mean ")[2].split()[0])
             if case.name.endswith((".dump", ".csv")):
                 # the angle is printed with two decimals, of positions with six digits or more
-                assert mean == pytest.approx(heap_angle(*cone()).mean, abs=0.02)
+                assert mean == pytest.approx(slope_of_cone(), abs=0.02)
                 assert "spheres of 2 mm radius" in said
             else:
-                # a pixel of the tip is 0.2 degrees, and the camera's noise blurs two
+                # a pixel of the tip is 0.3 degrees, and the camera's noise blurs two
                 assert mean == pytest.approx(SLOPE, abs=0.5)
         else:
             # the box has 72 mm3; two spheres in it have less, and at least a third

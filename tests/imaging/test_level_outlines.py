@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from imaging import Outline, heap_profile, heap_shape, profile_heights
+from imaging import Outline, heap_profile, heap_readings, heap_shape, profile_heights
 from imaging.flank.camera_height import level_outline
 from imaging.flank.plate_line import PlateLine
 
@@ -65,3 +65,21 @@ def test_a_drawn_outline_is_left_as_it_is() -> None:
         np.arange(40.0), np.minimum(np.arange(40.0), 39.0 - np.arange(40.0)), PlateLine(0.0, 0.0, True)
     )
     assert level_outline(outline) is outline
+
+
+@pytest.mark.parametrize("power", [1, 2])
+def test_readings_of_a_hollow_heap_differ_as_their_closed_forms_do(power: int) -> None:
+    x = np.linspace(-0.999, 0.999, 1999)
+    height = 60.0 * (1.0 - np.abs(x)) ** power
+    found = heap_readings(Outline(RADIUS * x, height, PlateLine(0.0, 0.0, visible=False)))
+    # h = H (1 - r/R)^n has the volume 2 pi H R^2 / ((n + 1) (n + 2)), its centre at H (n + 2) / (8 n + 4).
+    volume = 6.0 / ((power + 1.0) * (power + 2.0))
+    mass = (power + 2.0) / (2.0 * power + 1.0)
+    tangents = {"height_angle": 1.0, "volume_angle": volume, "centre_angle": mass}
+    for name, tangent in tangents.items():
+        # columns of a thousandth of the radius
+        assert getattr(found, name) == pytest.approx(np.degrees(np.arctan(0.6 * tangent)), abs=0.1)
+    # A hollow flank has a long, flat toe, which neither line goes through.
+    for angle in (found.line_angle, found.middle_angle):
+        assert (angle == pytest.approx(found.height_angle, abs=0.1)) == (power == 1)
+        assert (angle > found.height_angle + 1.0) == (power == 2)

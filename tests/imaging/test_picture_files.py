@@ -6,12 +6,13 @@ import types
 import zlib
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from drawn_heaps import Camera, DrawnHeap, draw
 from PIL import Image
 
-from imaging import PictureError, measure_photograph, read_picture, save_picture
+from imaging import PictureError, View, measure_photograph, read_picture, save_picture
 from imaging.photo.picture_file import FILM_DIAGONAL, MAXIMUM_PIXELS, focal_length
 
 
@@ -76,9 +77,29 @@ def test_a_near_camera_is_corrected_by_its_focal_length(tmp_path: Path) -> None:
     # The heap is 200 of 520 pixels wide: the camera was 1 or 2 heap widths away and saw it flatter.
     assert 1.0 < near.outline.distance < 2.0
     assert near.mean > measure_photograph(save_picture(tmp_path / "plain.png", picture)).mean + 0.5
+    # Cut by hand, without a focal length, nothing says how far the camera was.
+    assert measure_photograph(tmp_path / "plain.png").outline.nearest is None
     # Cut to another size than the camera's, a picture no longer has its angle of view.
     assert focal_length(with_focal_length(tmp_path / "cut.jpg", picture, 26, (4000, 3000))) is None
     assert focal_length(save_picture(tmp_path / "none.png", picture)) is None
+
+
+def test_an_unknown_distance_is_in_the_interval_of_a_whole_picture(tmp_path: Path) -> None:
+    """The camera may have had the widest usual lens; the heap of 200 pixels has 0.6 and 0.3 of the width."""
+    for angle, columns, doubts in ((46, 322, ["distance"]), (30, 334, []), (30, 666, [])):
+        drawn = draw(DrawnHeap(angle, angle, 200, grain=5), Camera(plate=(90, 90, 90), margin=0.05))
+        side, above = (columns - drawn.shape[1]) // 2, columns * 3 // 4 - len(drawn)
+        whole = cv2.copyMakeBorder(drawn, above, 0, side, side, cv2.BORDER_REPLICATE)
+        plain = measure_photograph(save_picture(tmp_path / "plain.png", whole))
+        far = measure_photograph(tmp_path / "plain.png", view=View(distance=np.inf))
+        near = measure_photograph(tmp_path / "plain.png", view=View(distance=plain.outline.nearest))
+        assert ([doubt.name for doubt in plain.doubts], far.doubts) == (doubts, ())
+        # The change is as the inverse distance's square, here half of the greatest: a tenth for the rest.
+        assert (plain.mean - far.mean) / (near.mean - far.mean) == pytest.approx(0.5, abs=0.1)
+        # All inverse distances are equally likely. Other grains, seen from nearby, are as rough.
+        others = min(np.degrees(0.5 / plain.outline.likely_distance) / 6.0, 2.0)
+        unknown = np.sqrt(plain.se**2 - (1.0 + others) * far.se**2)
+        assert unknown / (near.mean - far.mean) == pytest.approx((1 / 5 - 1 / 3 + 1 / 4) ** 0.5, rel=0.15)
 
 
 @pytest.mark.parametrize("bits", [10, 12, 14])

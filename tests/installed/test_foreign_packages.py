@@ -1,7 +1,6 @@
 """Packages of others that have the name of one of dem-warp's: recognised, and named with what to do."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -42,7 +41,13 @@ def test_a_package_that_is_found_first_is_named_with_its_folder(
 def test_a_package_that_was_installed_over_ours_is_named(
     name: str, installed: Installed, tmp_path: Path
 ) -> None:
-    site = Path(shutil.copytree(installed.sites[0], tmp_path / "site"))
+    site = tmp_path / "site"
+    (site / name).mkdir(parents=True)
+    for entry in (*installed.sites[0].iterdir(), *(installed.sites[0] / name).iterdir()):
+        there = site / entry.relative_to(installed.sites[0])
+        if not there.exists():
+            there.symlink_to(entry)
+    (site / name / "__init__.py").unlink()
     (site / name / "__init__.py").write_text('"""Classical designs."""\n', encoding="utf-8")
     about = site / "classical-0.1.dist-info"
     about.mkdir()

@@ -27,6 +27,7 @@ at_least = 1  # two corners have no noise to compare an effect with
 MAGNETS = {"grain-magnets": "1.0"}
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
 JAR = '[scene.jar]\ndiameter = "12 mm"\nheight = "20 mm"\ngrain_count = 10\n'
+TABLE = "[scene.table]\ngrain_count = 4\n"
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +43,7 @@ def plugged(installed: Installed, tmp_path_factory: pytest.TempPathFactory) -> I
 COMMANDS = {
     "doctor": "doctor --json",
     "heap": "heap jar.toml --device cpu --out jar --json",
+    "table": "heap table.toml --device cpu --out table --json",
     "export": "export leaves.toml --to leaflet --approximate --out leaflet",
     "calibrate": "calibrate magnets.toml --device cpu --engine cones --out out --json",
     "resume": "calibrate magnets.toml --device cpu --engine cones --out out --json --resume",
@@ -65,7 +67,8 @@ def alone() -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def together(plugged: Installed) -> dict[str, Any]:
     shutil.copy(TESTS / "plugin" / "conformance.py", plugged.work)
-    for name, text in {"jar": SMALL.replace(TUBE, JAR), "leaves": SMALL, "magnets": SMALL + CORNERS}.items():
+    scenes = {"jar": SMALL.replace(TUBE, JAR), "table": SMALL.replace(TUBE, TABLE)}
+    for name, text in {**scenes, "leaves": SMALL, "magnets": SMALL + CORNERS}.items():
         (plugged.work / f"{name}.toml").write_text(text, encoding="utf-8")
     words = json.dumps([command.split() for command in COMMANDS.values()])
     found = json.loads(plugged.python(*PROBE, words).splitlines()[-1])
@@ -77,14 +80,14 @@ def test_additions_of_a_package_follow_the_built_in_entries(
     alone: dict[str, Any], together: dict[str, Any]
 ) -> None:
     added = {
-        "laws": "magnetism",
-        "scenes": "jar",
-        "designs": "corners",
-        "engines": "cones",
-        "exporters": "leaflet",
+        "laws": ["magnetism"],
+        "scenes": ["jar", "table"],
+        "designs": ["corners"],
+        "engines": ["cones"],
+        "exporters": ["leaflet"],
     }
-    for kind, name in added.items():
-        assert together[kind] == [*alone[kind], name]
+    for kind, names in added.items():
+        assert together[kind] == [*alone[kind], *names]
 
 
 def test_an_entry_that_cannot_be_used_is_named_and_skipped(together: dict[str, Any]) -> None:
@@ -118,6 +121,13 @@ def test_a_scene_is_simulated(together: dict[str, Any]) -> None:
     assert (heap["status"], heap["observables"]["grain_count"]) == ("finished", 10.0)
     # Ten spheres of 2 mm in a jar of 12 mm lie in three layers at the most.
     assert 1e-3 < heap["observables"]["fill_height"] < 6e-3
+
+
+def test_a_scene_may_place_its_grains(together: dict[str, Any]) -> None:
+    table = json.loads(together["table"])
+    assert (table["status"], table["observables"]["grain_count"]) == ("finished", 4.0)
+    # the study's spheres of 2 mm, with a spread of sizes of 5 %, stand on it
+    assert table["observables"]["mean_height"] == pytest.approx(2e-3, rel=0.15)
 
 
 def test_doctor_lists_the_package_and_its_entries(together: dict[str, Any]) -> None:

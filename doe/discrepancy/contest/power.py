@@ -128,7 +128,7 @@ def _errors(fitted: Fitted, names: Sequence[str], theta: np.ndarray) -> np.ndarr
         metric = left[:, start:end].T @ left[:, start:end]
         for number, name in enumerate(names):
             part = fitted.model.emulator.surfaces[block.condition].additions[name]
-            seen = np.sum(metric * part.covariance[np.ix_(block.columns, block.columns)])
+            seen = np.sum(metric * part.covariance[block.square])
             for own, error in zip(out[:, number], (part.chance, part.gram_inverse), strict=True):
                 own += np.einsum("ks,st,kt->k", terms, error, terms) * seen
         start = end

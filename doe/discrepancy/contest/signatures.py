@@ -116,7 +116,7 @@ def _shared_errors(fitted: Fitted, name: str) -> np.ndarray:
     for block in fitted.stack.blocks:
         surfaces = fitted.model.emulator.surfaces[block.condition]
         covariance = surfaces.shared_error(fitted.x, fitted.mechanisms, name, SECANT) / SECANT
-        parts.append(covariance[np.ix_(block.columns, block.columns)])
+        parts.append(covariance[block.square])
     return np.asarray(block_diag(*parts))
 
 

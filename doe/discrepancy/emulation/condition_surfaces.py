@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
 
 from doe.discrepancy.emulation.run_noise import Noise
 from doe.numerics.kriging import Kriging
+
+FEW = 64
+"""Largest number of points whose terms are remembered."""
 
 
 @cache
@@ -24,10 +27,26 @@ def _products(size: int, degree: int) -> np.ndarray:
 
 
 def polynomial(theta: np.ndarray, degree: int) -> np.ndarray:
-    """Return the terms of a full polynomial: products of 1 and factors, lower degrees first, (n, terms)."""
+    """Return the terms of a full polynomial: products of 1 and factors, lower degrees first, (n, terms).
+
+    Terms of few points are remembered, as all conditions and observables use them; they cannot be written to.
+    """
+    if len(theta) > FEW:
+        return _terms(theta, degree)
+    return _remembered_terms(theta.astype(np.float64, copy=False).tobytes(), theta.shape, degree)
+
+
+def _terms(theta: np.ndarray, degree: int) -> np.ndarray:
     one, numbers = np.ones((len(theta), 1 + theta.shape[1])), _products(theta.shape[1], degree)
     one[:, 1:] = theta
     return np.asarray(one.take(numbers.T, axis=1).prod(axis=1))
+
+
+@lru_cache(maxsize=64)
+def _remembered_terms(points: bytes, shape: tuple[int, int], degree: int) -> np.ndarray:
+    terms = _terms(np.frombuffer(points).reshape(shape), degree)
+    terms.flags.writeable = False
+    return terms
 
 
 def added(theta: np.ndarray, size: np.ndarray) -> np.ndarray:

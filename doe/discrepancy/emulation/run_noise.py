@@ -47,7 +47,7 @@ class Noise:
         It is the mean over its uncertainty: weights are its inverse, and the inverse of an estimate from n
         squares is n / (n - 2) times too large. A logarithm of variance v = 2 / n makes that exp(v).
         """
-        planes = _planes(np.clip(theta, -1.0, 1.0))
+        planes = _planes(np.minimum(np.maximum(theta, -1.0), 1.0))  # faster than clip for one point
         open_ = ((planes @ self.spread) * planes).sum(axis=-1, keepdims=True)
         return np.asarray(np.exp(planes @ self.coefficients + open_))
 
@@ -96,7 +96,9 @@ def fit_noises(repeats: Sequence[tuple[np.ndarray, np.ndarray]], floor: np.ndarr
 
 def _planes(theta: np.ndarray) -> np.ndarray:
     """Return the terms of a plane at coded factors (..., factors), (..., 1 + factors)."""
-    return np.concatenate([np.ones((*theta.shape[:-1], 1)), theta], axis=-1)
+    terms = np.ones((*theta.shape[:-1], 1 + theta.shape[-1]))
+    terms[..., 1:] = theta
+    return terms
 
 
 def _maps(conditions: int, size: int) -> list[np.ndarray]:

@@ -29,7 +29,7 @@ from doe.discrepancy.emulation.run_noise import (
     repeat_deviations,
 )
 from doe.errors import RuleError
-from doe.numerics.kriging import Covariance
+from doe.numerics.kriging import Covariance, fit_noisy_kriging
 
 FAILURE_LEVEL = 0.005
 """Probability under noise alone of leave-one-out errors from which on a polynomial fails."""
@@ -42,6 +42,8 @@ SCALE_ROUNDS = 2
 """Rounds in which scales and noise are found, each from the other."""
 LEAST_SCALE = 1e-3
 """Least standard deviation of a coefficient, in that of one run."""
+LEAST_LONE = 3
+"""Runs per term of a quadratic from which on a bank without repeats shows its noise."""
 LEAST_SIZE = 0.05
 """Coded size below which the addition of a mechanism is not divided by its size."""
 
@@ -49,16 +51,32 @@ LEAST_SIZE = 0.05
 def repeats_of(theta: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return coded factors and independent deviations of repeats without a mechanism, at equal factors.
 
+    Of a bank without repeats, it returns what runs differ by from the prediction of the others.
+
     Raises RuleError: too few finished runs for the noise or the polynomial of `fit_bases`.
     """
     points, groups = np.unique(theta, axis=0, return_inverse=True)
     rows, deviations = repeat_deviations(groups.reshape(-1), values)
+    if not len(rows) and len(theta) > LEAST_LONE * polynomial(theta[:1], 2).shape[1]:
+        rows, deviations = np.arange(len(theta)), lone_deviations(theta, values)
     if len(rows) <= values.shape[1] + 1 or len(points) <= polynomial(points, 2).shape[1]:
         rule = (
             "must have more points without a mechanism than polynomial terms, more repeats than observables"
         )
         raise RuleError("bank", rule, f"{len(points)} points, {len(rows)} repeats")
     return theta[rows], deviations
+
+
+def lone_deviations(theta: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return deviations of runs without repeats, with the variance of one run's noise, (n, observables).
+
+    A quadratic and a smooth function, with a noise of largest likelihood, predict each run from the others;
+    what it differs by is as large as the noise where its expected error is taken out.
+    """
+    terms = polynomial(theta, 2)
+    missed = values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0]
+    fits = [fit_noisy_kriging(theta, column) for column in missed.T]
+    return np.column_stack([np.sqrt(noise) * process.standard for process, noise in fits])
 
 
 @dataclass(frozen=True, eq=False)

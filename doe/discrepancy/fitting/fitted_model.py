@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from doe.discrepancy.emulation.condition_surfaces import all_terms
 from doe.discrepancy.emulation.correction import Correction
@@ -130,7 +129,7 @@ class Model:
         if self.is_directed:
             turn = self.turn(block.condition)
             error = error * np.outer(turn, turn)
-        return np.asarray(error[np.ix_(block.columns, block.columns)])
+        return np.asarray(error[block.square])
 
     def slope_chance(self, x: np.ndarray, block: Block) -> tuple[np.ndarray, np.ndarray]:
         """Return covariances of the slopes of a block's prediction due to the noise of bank and fresh runs.
@@ -151,7 +150,7 @@ class Model:
         if self.is_directed:
             of_each = of_each * self.turn(block.condition)[:, None, None] ** 2
         correlation = surfaces.correlation(x, self.mechanisms)
-        return of_each[block.columns], correlation[np.ix_(block.columns, block.columns)]
+        return of_each[block.columns], correlation[block.square]
 
     def shift_slopes(self, x: np.ndarray, block: Block) -> np.ndarray:
         """Return derivatives of the prediction of a block by the shift, (k, parameters).
@@ -264,4 +263,10 @@ class Stack:
 
 
 def _blocks(parts: Iterable[np.ndarray]) -> np.ndarray:
-    return np.asarray(block_diag(*parts))
+    """Return the matrix with square parts on its diagonal; SciPy's takes 30 times as long."""
+    parts = [*parts]
+    out, end = np.zeros(2 * [sum(map(len, parts))]), 0
+    for part in parts:
+        start, end = end, end + len(part)
+        out[start:end, start:end] = part
+    return out

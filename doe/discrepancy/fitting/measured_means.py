@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -51,6 +52,11 @@ class Block:
         scales = scale_numbers(observables, calibration)[self.columns]
         return replace(self, common=moved.reshape(-1, 2).T, scales=scales)
 
+    @cached_property
+    def square(self) -> tuple[np.ndarray, ...]:
+        """Index of the means' part of a matrix of all observables."""
+        return np.ix_(self.columns, self.columns)
+
     @property
     def replicates(self) -> np.ndarray:
         """Replicates of each mean, (k,)."""
@@ -58,7 +64,7 @@ class Block:
 
     def noise(self, covariance: np.ndarray, excess: Excess) -> np.ndarray:
         """Return the covariance of the means' noise (k, k) from that of one run and the excess."""
-        return np.asarray(excess.added_to(covariance)[np.ix_(self.columns, self.columns)] * self.share)
+        return np.asarray(excess.added_to(covariance)[self.square] * self.share)
 
 
 @dataclass(frozen=True, eq=False)

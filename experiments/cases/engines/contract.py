@@ -149,7 +149,7 @@ def write_case(case: Case[Any], folder: Path) -> None:
         "laws": _laws(case),
         "scene": _scene(case),
         "walls": _walls(case, folder),
-        "stop": {name: getattr(scene, name) for name in ("rest_speed", "rest_time")},
+        "stop": {name: getattr(scene, name, None) for name in ("rest_speed", "rest_time")},
         "time_step": case.time_step,
         "observables": {
             name: {"unit": each.unit, "meaning": each.meaning} for name, each in scene.observables.items()

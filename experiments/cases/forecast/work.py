@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
-from dem_warp import Case, PouredScene
+from dem_warp import Case, PlacedScene, PouredScene
 from dem_warp.device import resolve_device
 from dem_warp.solver import CHUNK
 
@@ -26,6 +27,8 @@ class Work:
     """[s]."""
     steps: float
     """Time steps from the first grain to rest."""
+    phases: Mapping[str, float] = field(default_factory=dict, compare=False)
+    """Time steps of each phase; empty where they are unknown."""
 
 
 def rest_of(command: str) -> Work:
@@ -37,21 +40,25 @@ def work_of(case: Case[Any]) -> Work:
     """Predict the size of a case; an unknown test counts as one second of a thousand spheres."""
     each, names = case.grains.sphere_count, " + ".join(kind.__name__ for kind in case.kinds)
     kind = f"{names}, {each} spheres a grain, {case.numerics.precision}"
-    if not isinstance(case.scene, PouredScene):
+    if not isinstance(case.scene, PouredScene | PlacedScene):
         return Work(kind, 1000 // each, 1000, case.time_step, 1.0 / case.time_step)
     grains = case.scene.supply(case)
-    return Work(kind, grains, grains * each, case.time_step, _duration(case, grains) / case.time_step)
+    phases = {name: time / case.time_step for name, time in _durations(case, grains).items()}
+    return Work(kind, grains, grains * each, case.time_step, sum(phases.values()), phases)
 
 
-def _duration(case: Case[Any], grains: int) -> float:
-    """Return the simulated time of a poured test [s]: its rain and its own expected phases."""
+def _durations(case: Case[Any], grains: int) -> dict[str, float]:
+    """Return the simulated time of each phase of a test [s], the rain in the first."""
     scene = case.scene
     if fixed := getattr(scene, "duration", None):
-        return float(fixed)
+        return {"whole test": float(fixed)}
+    first, *others = _phases(_Test(scene, case))
+    if not isinstance(scene, PouredScene):
+        return dict([first, *others])
     mean_volume = float(case.grains.mean(lambda shape: shape.volume)) * case.grains.size_mean**3
     filled = BULK_FRACTION * scene.volume / (grains * mean_volume)
-    rain = grains / scene.rain_rate * (min(filled, 1.0) if scene.grain_count is None else 1.0)
-    return rain + _phases(_Test(scene, case))
+    rain = grains / scene.grains_per_second(case) * (1.0 if scene.is_counted else min(filled, 1.0))
+    return dict([(first[0], rain + first[1]), *others])
 
 
 @dataclass(frozen=True)
@@ -63,9 +70,9 @@ class _Test:
 
 
 @lru_cache(maxsize=1024)
-def _phases(test: _Test) -> float:
-    """Time that a test expects of its phases when one grain is poured [s]."""
+def _phases(test: _Test) -> tuple[tuple[str, float], ...]:
+    """Time that a test expects of each of its phases with one grain [s]."""
     case = replace(test.case, scene=replace(test.scene, grain_count=1))
     [setup] = case.scene.prepare([case], resolve_device(None))
     phases = case.scene.controller(case, setup, CHUNK).phases
-    return float(sum(phase.expected for phase in phases.values()))
+    return tuple((name, float(phase.expected)) for name, phase in phases.items())

@@ -14,7 +14,7 @@ import numpy as np
 
 from dem_warp import Film, Frame
 from experiments.cases.engines.surfaces import triangles_of
-from experiments.cases.show.polydata import poly, save
+from experiments.cases.show.polydata import poly, save, save_series
 from experiments.io.files import replacing, write_text
 
 if TYPE_CHECKING:
@@ -26,9 +26,15 @@ BEYOND = 1.2
 AXES_OF_TENSOR = 9
 """Components of a matrix, row by row."""
 
+VTK_OF_SERIES = (9, 7)
+"""Lowest VTK that writes series: before, a file of a changing number of points is read with wrong ones."""
+
 
 def write_frames(film: Film, folder: Path) -> list[Path]:
     """Write the frames of a case into a folder: one ``.pvd`` a series, which lists a file for each time [s].
+
+    ``spheres.vtkhdf`` holds all spheres at all times, as the particle file of ON-DEM does; VTK before 9.7
+    cannot write it, and it is left out.
 
     ``spheres`` and ``grains`` are points, ``contacts`` lines from a grain's centre to its partner's or to the
     wall, and each wall has a series of its own, by its name.
@@ -36,22 +42,30 @@ def write_frames(film: Film, folder: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        The ``.pvd`` files.
+        The ``.pvd`` files and the ``.vtkhdf`` file, if there is one.
     """
-    half_width = BEYOND * farthest(film)
+    import pyvista
+
+    half_width, times, spheres = BEYOND * farthest(film), [frame.time for frame in film.frames], []
     written = {}
     for name in ("spheres", "grains", "contacts", *film.wall_names):
         rows = []
         for number, frame in enumerate(film.frames):
-            place = Path(name) / f"{number:04d}.vtp"
+            place, data = Path(name) / f"{number:04d}.vtp", _data_of(name, film, frame, half_width)
+            spheres += [data] * (name == "spheres")
             with replacing(folder / place) as temporary:
-                save(_data_of(name, film, frame, half_width), temporary)
+                save(data, temporary)
             rows.append((frame.time, place.as_posix()))
         written[folder / f"{name}.pvd"] = _collection(rows)
     # last, so that a series that exists is whole
     for path, text in written.items():
         write_text(path, text)
-    return list(written)
+    if pyvista.vtk_version_info[:2] < VTK_OF_SERIES:
+        return list(written)
+    whole = folder / "spheres.vtkhdf"
+    with replacing(whole) as temporary:
+        save_series(times, spheres, temporary)
+    return [*written, whole]
 
 
 def farthest(film: Film) -> float:

@@ -1,11 +1,11 @@
-"""Points, lines and triangles as ``.vtp`` files that ParaView and OVITO read.
+"""Points, lines and triangles as ``.vtp`` files that ParaView and OVITO read; series as ``.vtkhdf`` files.
 
-OVITO reads neither compressed files nor field data, so these files have none.
+OVITO reads neither compressed files nor field data, so ``.vtp`` files have none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,3 +52,32 @@ def save(data: pyvista.PolyData, path: Path) -> None:
     writer.SetDataModeToBinary()
     writer.Write()
     path.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")
+
+
+def save_series(times: Sequence[float], data: Sequence[pyvista.PolyData], path: Path) -> None:
+    """Write data at some times [s] into one ``.vtkhdf`` file."""
+    from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
+    from vtkmodules.vtkIOHDF import vtkHDFWriter
+
+    class Series(VTKPythonAlgorithmBase):  # type: ignore[misc]
+        """Source of the data, at the time that the writer asks for; VTK names its functions."""
+
+        def RequestInformation(self, _request: Any, _inputs: Any, outputs: Any) -> int:  # noqa: N802
+            of_output = outputs.GetInformationObject(0)
+            of_output.Set(Pipeline.TIME_STEPS(), list(times), len(times))
+            of_output.Set(Pipeline.TIME_RANGE(), [times[0], times[-1]], 2)
+            return 1
+
+        def RequestData(self, _request: Any, _inputs: Any, outputs: Any) -> int:  # noqa: N802
+            time = outputs.GetInformationObject(0).Get(Pipeline.UPDATE_TIME_STEP())
+            self.GetOutputData(outputs, 0).ShallowCopy(data[list(times).index(time or times[0])])
+            return 1
+
+    source, writer = Series(nInputPorts=0, nOutputPorts=1, outputType="vtkPolyData"), vtkHDFWriter()
+    writer.SetInputConnection(source.GetOutputPort())
+    writer.SetWriteAllTimeSteps(True)
+    writer.SetChunkSize(max(each.n_points for each in data) + 1)
+    writer.SetFileName(str(path))
+    if not writer.Write():
+        raise OSError(f"VTK cannot write {path}")

@@ -5,11 +5,10 @@ are moved on too, but meet nobody: `of free grains` leaves them out. The columns
 (`--columns`); worlds beyond `--seeds` hold the same columns at other moments.
 
     python -m experiments.evidence.performance.heap_throughput --scale soft --device cpu --processes 2
-    python -m experiments.evidence.performance.heap_throughput --scale soft --peer lammps --peer yade
     python -m experiments.evidence.performance.heap_throughput --scale paper --device cuda --worlds 1,128
 
-Every table goes to `--out` as CSV, and all of them to throughput.md; comparisons with other codes go to
-its folder peers and to peers.md. `record.py` puts both pages into README.md.
+Every table goes to `--out` as CSV, and all of them to throughput.md, which `performance_record` puts into
+README.md.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,8 +24,6 @@ from experiments.commands.options import OneDevice
 from experiments.evidence.machine import machine
 from experiments.evidence.performance.columns import MOMENTS, Columns
 from experiments.evidence.performance.parallel import processes_table
-from experiments.evidence.performance.peers.peer_comparison import compare
-from experiments.evidence.performance.peers.peer_list import PEERS, PeerName
 from experiments.evidence.performance.result_pages import Part, parse_counts, write_results
 from experiments.evidence.performance.roofline import Traffic, copy_bandwidth, step_traffic
 from experiments.evidence.performance.timing import Timing, run_in, start, time_steps
@@ -80,36 +77,21 @@ def main(
     worlds: Annotated[str, typer.Option(help="Numbers of worlds to measure, such as 1,12,31,128.")] = "1",
     seeds: Annotated[int, typer.Option(help="Most columns to simulate beforehand.")] = 32,
     steps: Annotated[int, typer.Option(help="Steps of a stretch.")] = 2048,
-    peer: Annotated[list[PeerName] | None, typer.Option(help="Codes to compare with, each named so.")] = None,
     processes: Annotated[int, typer.Option(help="Processes to run at once on the CPU.")] = 1,
     columns: Annotated[Path, typer.Option(help="Folder of simulated columns.")] = Path("out/columns"),
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/throughput"),
 ) -> None:
     """Measure, print and write the tables."""
     name, counts = resolve_device(device), parse_counts(worlds)
-    if name != "cpu" and (peer or processes > 1):
-        raise typer.BadParameter("--peer and --processes are for --device cpu")
-    _require_installed(peer or [])
+    if name != "cpu" and processes > 1:
+        raise typer.BadParameter("--processes is for --device cpu")
     prepared = Columns(scale, min(max(counts), seeds), name, columns)
     parts: list[Part] = []
     for parts in speed_tables(prepared, counts, steps):
         write_results(out, "throughput", parts)
     if processes > 1:
         parts.append(processes_table(prepared, columns, processes, steps))
-    pages = [write_results(out, "throughput", parts)]
-    if peer:
-        comparisons = [compare(code, prepared, steps, out / code) for code in peer]
-        pages.append(write_results(out / "peers", "peers", comparisons))
-    print("\n".join(page.read_text(encoding="utf-8") for page in pages))
-
-
-def _require_installed(peers: Sequence[PeerName]) -> None:
-    """Refuse peers that are not there before anything is measured."""
-    try:
-        for peer in peers:
-            PEERS[peer].locate()
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--peer") from error
+    print(write_results(out, "throughput", parts).read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":

@@ -81,14 +81,6 @@ def step_traffic(solver: Solver) -> Traffic:
     return Traffic(length, touching, table[table["elements"] > 0])
 
 
-def memory_bytes(solver: Solver) -> int:
-    """Bytes of all device arrays of a solver."""
-    neighbours = solver.neighbours
-    lists = (neighbours, neighbours.near, neighbours.reactions)
-    holders = (solver, solver.model, *solver.grains, *lists, solver.cells)
-    return sum(array.size * _element_bytes(array) for holder in holders for _, array in _arrays(holder))
-
-
 def world_contacts(solver: Solver, world: int) -> ContactCounts:
     """Contacts of a world of one shape as they now stand."""
     setup, poses = solver.worlds[world], solver.poses(world)

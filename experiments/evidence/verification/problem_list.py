@@ -13,7 +13,11 @@ from experiments.evidence.verification.problems.liggghts_contacts import liggght
 from experiments.evidence.verification.problems.micro_slip_path import micro_slip
 from experiments.evidence.verification.problems.normal_impact import elastic_impact, restitution
 from experiments.evidence.verification.problems.oblique_impact import oblique_impact, spinning_impact
+from experiments.evidence.verification.problems.penetrated import penetrated
+from experiments.evidence.verification.problems.pressed import pressed, sheared
+from experiments.evidence.verification.problems.released_boxes import released
 from experiments.evidence.verification.problems.rigid_body import rigid_body
+from experiments.evidence.verification.problems.single_grains import single_grains
 from experiments.evidence.verification.problems.stability import stability
 from experiments.evidence.verification.problems.yade_contacts import yade_contacts
 
@@ -34,11 +38,16 @@ PROBLEMS: dict[str, Problem] = {
     "janssen": janssen,
     "beverloo": beverloo,
     "heap-angle": heap_angle,
+    "released": released,
+    "pressed": pressed,
+    "penetrated": penetrated,
+    "sheared": sheared,
+    "single-grains": single_grains,
     "stability": stability,
 }
 
 PEERS = ("liggghts-contacts", "liggghts-clumps", "lammps-contacts", "yade-contacts", "deme-contacts")
 """Problems that run another code, which must be installed."""
 
-HEAVY = ("beverloo", "heap-angle", "stability", *PEERS)
+HEAVY = ("beverloo", "heap-angle", "penetrated", "pressed", "released", "sheared", "stability", *PEERS)
 """Problems that run only when they are named: minutes on a GPU, up to hours on two cores, or another code."""

@@ -111,10 +111,9 @@ def format_of(path: Path) -> Format | None:
     head = head_of(path)
     if head.lstrip().lower().startswith(WEB):
         return None
-    known = [NUMPY] if "\0" in head else FORMATS
-    if head.startswith("# vtk DataFile") or "<VTKFile" in head[:4096]:
-        known = [VTK]
-    return next((each for each in known if each.recognises(head)), None)
+    if VTK.recognises(head):
+        return VTK
+    return next((each for each in ([NUMPY] if "\0" in head else FORMATS) if each.recognises(head)), None)
 
 
 def require_known(path: Path) -> None:

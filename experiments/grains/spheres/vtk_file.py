@@ -1,4 +1,7 @@
-"""VTK files with a point for each sphere, from LIGGGHTS, Yade, ParaView and dem-warp (``heap.vtp``)."""
+"""VTK files with a point for each sphere, from LIGGGHTS, Yade, ParaView and dem-warp (``heap.vtp``).
+
+VTKHDF is the particle file of ON-DEM, the network of DEM codes (COST action CA22132).
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,11 @@ _ENDINGS = {
     "PolyData": ".vtp", "UnstructuredGrid": ".vtu",
     "PPolyData": ".pvtp", "PUnstructuredGrid": ".pvtu", "Collection": ".pvd",
 }  # fmt: skip
+HDF, _HDF_ENDING = "\x89HDF", ".hdf"
+"""First bytes of an HDF5 file; of these, VTK's have the group VTKHDF."""
+_HDF_KINDS = ("PolyData", "UnstructuredGrid")
+_PARTS = ("PartitionedDataSet", "PartitionedDataSetCollection", "MultiBlockDataSet")
+"""Kinds of data in parts, which are read together."""
 
 
 def _read(path: Path) -> SphereFile:
@@ -51,10 +59,17 @@ def _read(path: Path) -> SphereFile:
 
 def _last_grid(reader: Any) -> Any:
     """Read a grid; of a collection of times the last one, all of its parts."""
+    import pyvista
+
     times = getattr(reader, "number_time_points", 0)
     if times:
         reader.set_active_time_point(times - 1)
+    elif hasattr(reader.reader, "SetStep"):  # VTKHDF
+        reader.reader.UpdateInformation()
+        reader.reader.SetStep(max(reader.reader.GetNumberOfSteps() - 1, 0))
     grid = reader.read()
+    if hasattr(grid, "n_partitions"):
+        grid = pyvista.MultiBlock(list(grid))
     return grid.combine() if hasattr(grid, "combine") else grid
 
 
@@ -62,6 +77,9 @@ def _ending(path: Path) -> str:
     """Return the right ending of a VTK file, by its content."""
     with path.open("rb") as file:
         head = file.read(4096).decode("latin-1")
+    if head.startswith(HDF):
+        _check_hdf(path)
+        return _HDF_ENDING
     if head.startswith("# vtk DataFile"):
         return ".vtk"
     match = re.search(r'<VTKFile[^>]*\btype="(\w+)"', head)
@@ -71,4 +89,23 @@ def _ending(path: Path) -> str:
     return _ENDINGS[kind]
 
 
-VTK = Format("VTK file", lambda head: head.startswith("# vtk DataFile") or "<VTKFile" in head[:4096], _read)
+def _check_hdf(path: Path) -> None:
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    reader = vtkHDFReader()
+    if not reader.CanReadFile(str(path)):
+        raise InputError(str(path), "the VTKHDF file is cut off or damaged")
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    kind = reader.GetOutputDataObject(0).GetClassName().removeprefix("vtk")
+    if kind not in (*_HDF_KINDS, *_PARTS):
+        problem = f"the type of the VTKHDF file must be {' or '.join(_HDF_KINDS)}, whole or in parts"
+        raise InputError(str(path), problem, kind, "Write a point for each sphere.")
+
+
+def _recognises(head: str) -> bool:
+    is_hdf = head.startswith(HDF) and "VTKHDF" in head
+    return is_hdf or head.startswith("# vtk DataFile") or "<VTKFile" in head[:4096]
+
+
+VTK = Format("VTK file", _recognises, _read)

@@ -72,6 +72,7 @@ function values() {
   if (chosen("shape") === "sphere") all["grain.sphere"] = value("sphere");
   else all["grain.clump"] = clumpFile;
   if (chosen("target") === "pictures") all["target.pictures"] = photoFolder;
+  if (chosen("target") === "pictures" && value("test") === "drum") all["target.observable"] = "dynamic_angle";
   return all;
 }
 
@@ -139,11 +140,13 @@ async function measure() {
     await request(`upload/${encodeURIComponent(folder)}/${encodeURIComponent(file.name)}`, file);
   }
   const fit = document.querySelector('[data-place="measurement.fit"]').value;
-  const measured = await ask("angles", { folder, fit });
+  const drum = value("test") === "drum";
+  const measured = await ask("angles", { folder, fit, test: value("test") });
   photoFolder = folder;
-  const rows = measured.rows.map((row) => [row.picture, row.left, row.right, row.mean, row.se,
-    [row.reason, ...row.doubts].filter(Boolean).join("; ")]);
-  byId("angles").replaceChildren(table(["picture", "left", "right", "mean", "se", "doubts"], rows, "Measured photographs"));
+  const columns = drum ? ["picture", "mean", "se", "upper_angle", "lower_angle", "filling"] : ["picture", "left", "right", "mean", "se"];
+  const rows = measured.rows.map((row) => [...columns.map((name) => row[name]), [row.reason, ...row.doubts].filter(Boolean).join("; ")]);
+  const heads = [...columns.map((name) => name.replace("_", " ")), "doubts"];
+  byId("angles").replaceChildren(table(heads, rows, "Measured photographs"));
   byId("angles-mean").textContent = measured.mean;
   byId("angles-command").textContent = measured.command;
   show("angles-command", true);

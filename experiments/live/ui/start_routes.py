@@ -76,7 +76,7 @@ def answers_of(place: StudyFolder, runs: StartedRuns) -> dict[str, Answer]:
     return {
         "form": lambda asked: place.form(),
         "clump": place.clump,
-        "angles": lambda asked: place.angles(asked["folder"], asked["fit"]),
+        "angles": lambda asked: place.angles(asked["folder"], asked["fit"], asked.get("test", "")),
         "draft": lambda asked: place.draft(asked["name"], asked["values"], asked["factors"]),
         "check": lambda asked: place.checked(asked["file"], asked["text"]),
         "write": lambda asked: {"file": place.write(asked["file"], asked["text"]).name},

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp import SCENES
+from dem_warp import SCENES, Drum
 from experiments.grains.clumps.clump_maker import ClumpRequest, make_clump, write_clump
 from experiments.io.errors import InputError, Problem
 from experiments.io.files import replacing, write_text
@@ -138,16 +138,18 @@ class StudyFolder:
         options = [word for name in names if asked.get(name) for word in (f"--{name}", str(asked[name]))]
         return command_line("clump", asked.get("source", ""), *options)
 
-    def angles(self, folder: str, fit: str) -> dict[str, Any]:
-        """Measure the photographs of a folder, as ``dem-warp angle`` does."""
+    def angles(self, folder: str, fit: str, test: str) -> dict[str, Any]:
+        """Measure the photographs of a folder, as ``dem-warp angle`` does: heaps, or the test "drum"."""
         pictures = find_pictures(self._plain(folder), self.folder, "pictures")
-        rows = measure_pictures(pictures, PictureOptions(fit))
-        mean = mean_angle(rows)
+        options = PictureOptions(fit, drum=test == Drum.name)
+        rows = measure_pictures(pictures, options)
+        mean = mean_angle(rows, options)
+        chosen = ("--drum",) if options.drum else ("--fit", fit)
         names = [f"{folder}/{path.name}" for path in pictures]
         return {
             "rows": [row | {"picture": Path(row["picture"]).name} for row in rows],
             "mean": str(mean) if mean else "",
-            "command": command_line("angle", *names, "--fit", fit),
+            "command": command_line("angle", *names, *chosen),
         }
 
     def _plain(self, name: str) -> str:

@@ -8,7 +8,8 @@ from dataclasses import asdict
 import pandas as pd
 
 from doe import ScreenResult, compare_means
-from experiments.calibrate.results import Campaign, SurfaceResult
+from experiments.calibrate.campaign import Campaign
+from experiments.calibrate.results import SurfaceResult
 from experiments.report.kit.html import Chapter
 from experiments.report.kit.numbers import enumeration, fixed
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table

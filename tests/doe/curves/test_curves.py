@@ -3,8 +3,10 @@
 from functools import cache
 
 import numpy as np
+import pytest
 from scipy.stats import qmc
 
+from doe.curves.candidates import Candidates
 from doe.curves.curve_emulator import CurveEmulator
 from doe.curves.curve_fit import CurveFit, MeasuredCurve, fit_curves
 
@@ -83,3 +85,38 @@ def test_a_forecast_holds_what_was_not_measured():
         assert (made.expected > made.low).all()
     # bands hold a reading, whose error is left out here: more than their level of the true curves
     assert np.mean(inside) > 0.9
+
+
+@cache
+def noisy_emulators() -> dict[str, CurveEmulator]:
+    """Emulators of lines whose noise grows e-fold from the middle of one setting to its end."""
+    points = np.random.default_rng(7).uniform(-1.0, 1.0, (300, 1))
+    return {name: CurveEmulator.of(points, drawn(points, seed), True) for name, seed in (("a", 8), ("b", 9))}
+
+
+def drawn(points: np.ndarray, seed: int) -> np.ndarray:
+    """Draw a run at each point."""
+    noise = 0.3 * np.exp(points) * np.random.default_rng(seed).normal(size=(len(points), 1))
+    return (np.sin(2.0 * points) + noise) * np.ones(5)
+
+
+def test_an_emulator_finds_a_noise_that_varies():
+    for emulator in noisy_emulators().values():
+        low, middle, high = emulator.noise(np.array([[-1.0], [0.0], [1.0]]))[:, 0]
+        # a slope of a log-variance from 300 squares is known to sqrt(2 / 100) = 0.14, an end to twice that
+        assert np.log(high / low) == pytest.approx(4.0, abs=0.9)
+        # the score of five equal heights has five times the variance of one
+        assert middle == pytest.approx(5.0 * 0.09, rel=0.4)
+
+
+def test_candidates_are_as_probable_as_they_are_often_true():
+    found = Candidates(noisy_emulators(), np.linspace(-0.95, 0.95, 20)[:, None])
+    truths = np.random.default_rng(10).integers(20, size=400)
+    made = {name: drawn(found.settings[truths], seed) for name, seed in (("a", 11), ("b", 12))}
+    runs = [{name: curves[run] for name, curves in made.items()} for run in range(400)]
+    weights = np.array([found.weights(run) for run in runs])
+    assert weights.sum(axis=1) == pytest.approx(1.0)
+    # of 400 draws a share of .05 is .011 off, and the mean probability of the truth .02
+    rejected = np.mean([found.p_values(run)[true] < 0.05 for run, true in zip(runs, truths, strict=True)])
+    assert rejected == pytest.approx(0.05, abs=0.035)
+    assert weights[np.arange(400), truths].mean() == pytest.approx((weights**2).sum(axis=1).mean(), abs=0.04)

@@ -9,7 +9,7 @@ from scipy import stats
 from doe.discrepancy.emulation import run_noise
 from doe.discrepancy.emulation.condition_surfaces import polynomial
 from doe.discrepancy.emulation.run_noise import ALIKE, fit_noise, fit_noises, shared_correlations
-from doe.discrepancy.emulation.surface_fits import BaseRuns, fit_bases, shared_misfits
+from doe.discrepancy.emulation.surface_fits import BaseRuns, fit_bases, repeats_of, shared_misfits
 
 FLOOR = np.full(6, 1e-9)
 
@@ -150,3 +150,19 @@ def test_a_misfit_too_small_for_one_observable_is_said_by_all(misfit: float) -> 
     assert np.mean(found) == pytest.approx(misfit, abs=0.045)
     # Seen one by one each would be open by .5: they scatter by little more than their mean does.
     assert np.std(found) < 0.15
+
+
+def test_runs_without_repeats_show_their_noise():
+    rng = np.random.default_rng(4)
+    theta = rng.uniform(-1.0, 1.0, (200, 2))
+    smooth = np.column_stack([np.sin(3.0 * theta[:, 0]), theta[:, 0] * theta[:, 1] ** 2])
+    rows, deviations = repeats_of(theta, smooth + (0.2, 0.1) * rng.standard_normal((200, 2)))
+    assert len(rows) == 200
+    # a variance of 200 normal numbers is known to 10 %, and the smooth part takes some of them
+    assert (deviations**2).mean(axis=0) == pytest.approx([0.04, 0.01], rel=0.3)
+
+
+def test_terms_of_whole_numbers_are_those_of_the_same_numbers_with_a_point() -> None:
+    whole = np.array([[1, 0], [-1, 1]])
+    np.testing.assert_array_equal(polynomial(whole, 2), polynomial(whole.astype(float), 2))
+    np.testing.assert_array_equal(polynomial(whole, 2)[1], [1, -1, 1, 1, -1, 1])

@@ -82,20 +82,32 @@ def test_the_point_solves_crossing_planes() -> None:
     assert list(fit.point.values()) == pytest.approx(natural)
 
 
+def test_a_factor_by_itself_is_known_to_the_error_that_its_planes_give() -> None:
+    fit = joint_fit({"a": goal(2.0, 1.0, target=0.5), "b": goal(1.0, -1.0, target=0.4)})
+    # x = (a + b) / 3 and y = (a - 2 b) / 3 have errors of 0.1 sqrt(2) / 3 and 0.1 sqrt(5) / 3, coded.
+    for (name, row), error in zip(fit.intervals.iterrows(), np.sqrt([2.0, 5.0]) / 30.0, strict=True):
+        scale = fit.region().factors[["E", "F"].index(name)].half_range
+        ends = np.array([row["low"], row["high"]]) - row["value"]
+        # to the edges of cells of sqrt(2) / 200, and a quantile of 4,096 draws
+        np.testing.assert_allclose(ends / scale, [-1.96 * error, 1.96 * error], atol=0.016)
+        assert not row["low_open"]
+        assert not row["high_open"]
+
+
 def test_parallel_planes_leave_the_same_direction_open() -> None:
     fit = joint_fit({"a": goal(1.0, 1.0, target=0.6), "b": goal(2.0, 2.0, target=1.2)})
     pinned, free = (row for _, row in fit.directions.iterrows())
     np.testing.assert_allclose(np.abs(pinned[["E", "F"]]), np.sqrt(0.5), rtol=1e-9)
     assert free["E"] == pytest.approx(-free["F"])
-    assert np.isinf(free["half_width"])
-    # The band about x + y = 0.6 cuts the disc of radius sqrt(2); its longest chord is the one nearest to the
-    # centre. A cell is sqrt(2) / 200.
-    chord = np.sqrt(2.0 - (0.6 - half_width(0.05, 2)) ** 2 / 2.0)
-    assert free["span"] == pytest.approx(chord / np.sqrt(2.0), abs=0.01)
-    assert pinned["span"] < 0.1
     # A step d along (1, 1) / sqrt(2) changes a by sqrt(2) d and b by 2 sqrt(2) d: together they weigh
-    # (2 + 8) / 0.1^2. The quantile of 10,000 draws is known to 1.5 %.
-    assert pinned["half_width"] == pytest.approx(half_width(0.1, 1) / np.sqrt(10.0), rel=0.03)
+    # (2 + 8) / 0.1^2. The quantile is drawn; cells of sqrt(2) / 200 end at most one inside the interval.
+    reach = half_width(0.1, 1) / np.sqrt(10.0)
+    assert pinned["span"] == pytest.approx(reach / np.sqrt(2.0), abs=0.01)
+    # The band about x + y = 0.6 cuts the disc of radius sqrt(2); its longest chord is the one nearest to the
+    # centre.
+    chord = np.sqrt(2.0 - (0.6 - np.sqrt(2.0) * reach) ** 2 / 2.0)
+    assert free["span"] == pytest.approx(chord / np.sqrt(2.0), abs=0.01)
+    assert fit.intervals[["low_open", "high_open"]].to_numpy().all()
     # Of the line x + y = 0.6 the point is the one nearest to the centre.
     np.testing.assert_allclose(fit.coded_point, [0.3, 0.3], atol=1e-3)
 

@@ -5,7 +5,17 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from doe import Factor, Sample, Surface, central_composite, fit_surface, transfer, transfer_points
+from doe import (
+    Factor,
+    Sample,
+    Surface,
+    central_composite,
+    fit_surface,
+    full_factorial,
+    spread_points,
+    transfer,
+    transfer_points,
+)
 
 E, F = Factor.around("E", 0.4, 0.1), Factor.around("F", 0.05, 0.02)
 DESIGN = central_composite((E, F), "rotatable", 5)
@@ -120,3 +130,37 @@ def test_runs_lie_there_across_and_along_inside_the_box() -> None:
     assert (moves[1] @ slope > 0.0, moves[2] @ slope < 0.0) == (True, True)
     assert moves[[3, 4]] @ slope == pytest.approx(0.0, abs=1e-9)
     assert np.linalg.norm(moves[1:5], axis=1) == pytest.approx(0.5)
+
+
+def test_slopes_are_recovered_and_belong_to_the_polynomial() -> None:
+    rng = np.random.default_rng(3)
+    surface = source(1e-5, rng)
+    points = spread_points(surface, DESIGN.points.to_numpy(), 8, np.zeros((0, 2)))
+    runs = pd.DataFrame({f.name: f.to_natural(x) for f, x in zip((E, F), points.T, strict=True)})
+    tilt = points @ [0.5, -0.3]
+    found = transfer(surface, runs, there(runs, tilt + rng.normal(0.0, 1e-5, 8)), LEVEL, slopes=True)
+    # Shift, scale and slopes share what is linear; the whole is what is known.
+    elsewhere = rng.uniform(-1.0, 1.0, (9, 2))
+    natural = pd.DataFrame({f.name: f.to_natural(x) for f, x in zip((E, F), elsewhere.T, strict=True)})
+    expected = there(natural, elsewhere @ [0.5, -0.3])
+    np.testing.assert_allclose(found.evaluate(elsewhere)[0], expected, atol=2e-3)
+    np.testing.assert_allclose(
+        found.quadratic_form.value(elsewhere), found.evaluate(elsewhere)[0], rtol=1e-12
+    )
+    assert found.residual_df == 8 - 4
+    one = found.predict(dict(natural.iloc[0])).iloc[0]
+    assert one["mean"] == pytest.approx(expected[0], abs=2e-3)
+    assert one["prediction_low"] < one["confidence_low"] < one["mean"] < one["confidence_high"]
+    assert found.agrees(dict(natural.iloc[0]), Sample(expected[0], 0.4, 5))
+    assert not found.agrees(dict(natural.iloc[0]), Sample(expected[0] + 5.0, 0.4, 5))
+
+
+def test_points_are_spread_as_the_best_of_all_choices() -> None:
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
+    design = full_factorial((E, F), center=1)
+    surface = fit_surface(design, truth(design.natural), "first-order")
+    chosen = spread_points(surface, design.points.to_numpy(), 4, np.zeros((0, 2)))
+    # A line in two factors is best known from the four corners, each once.
+    assert sorted(map(tuple, chosen)) == sorted(map(tuple, corners))
+    # Of a place near one corner most is learned there, once the corners are made.
+    assert spread_points(surface, [[0.9, 0.9]], 1, corners).tolist() == [[1.0, 1.0]]

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from threadpoolctl import threadpool_info
 
 from dem_warp import Case, CaseResult, Progress, simulation
 from experiments.cases import OwnWorkers, Store, run_cases
+from experiments.cases.measuring import MeasuringThreads
 from experiments.cases.workers import own
 from experiments.studyfile import Study
 
@@ -190,3 +192,13 @@ def test_a_table_must_have_seeds_and_room_for_results(small_study: Study, tmp_pa
         run_cases(small_study, pd.DataFrame({"E": [0.3]}), Store(tmp_path))
     with pytest.raises(ValueError, match="angle"):
         run_cases(small_study, table_of([0.3]).assign(angle=1.0), Store(tmp_path))
+
+
+def test_blas_has_one_thread_only_while_heaps_are_measured() -> None:
+    def threads() -> list[int]:
+        return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+    before = threads()
+    with MeasuringThreads(2) as pool:
+        assert set(pool.submit(threads).result()) == {1}
+    assert threads() == before

@@ -9,13 +9,14 @@ import cv2
 import numpy as np
 import pytest
 import pyvista
-from commandline import dem_warp
+from commandline import dem_warp, refused
 from PIL import Image
 from scipy.spatial.transform import Rotation
 from small_study import ANGLE, TUBE
 
 from dem_warp import CaseResult
 from experiments.cases import Heap, write_heap
+from experiments.grains.spheres.reader import read_spheres
 from experiments.measurement.case_observables import observe
 from experiments.studyfile import Study
 
@@ -131,6 +132,24 @@ def test_files_are_such_that_ovito_reads_them(filmed: Path) -> None:
         assert (data.tag, piece.tag) == ("PolyData", "Piece")
         if file.parent.name in ("spheres", "grains", "filmed"):
             assert piece.attrib["NumberOfVerts"] == piece.attrib["NumberOfPoints"]
+
+
+def test_one_particle_file_has_the_spheres_of_every_time(filmed: Path, series: dict, tmp_path: Path) -> None:
+    path = filmed / "filmed/frames/spheres.vtkhdf"
+    reader = pyvista.get_reader(str(path), force_ext=".hdf")
+    for number, (_, spheres) in enumerate(series["spheres"]):
+        reader.reader.SetStep(number)
+        found = reader.read()
+        np.testing.assert_array_equal(found.points, spheres.points)
+        np.testing.assert_array_equal(found["radius"], spheres["radius"])
+    # files of spheres are read at their last time
+    last = series["spheres"][-1][1]
+    read = read_spheres(path)
+    np.testing.assert_allclose(read.spheres, np.column_stack([last.points, last["radius"]]), rtol=1e-7)
+    assert read.bodies is not None
+    cut = tmp_path / "cut.vtkhdf"
+    cut.write_bytes(path.read_bytes()[:-1000])
+    assert f"{cut}: the VTKHDF file is cut off or damaged" in refused("angle", cut)
 
 
 def test_the_film_has_every_frame(filmed: Path) -> None:

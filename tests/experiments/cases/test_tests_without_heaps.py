@@ -77,7 +77,10 @@ def test_a_table_to_fill_in_has_the_observables_of_the_test(drum: Study, tmp_pat
         ("base,1,height,12,mm,", "m.csv:2: observable: must be an observable or 'clogged'"),
         ("base,1,dynamic_angle,95,deg,", "dynamic_angle must be between 0 and 90 deg in this test"),
         ("base,1,fill_height,11,,", "fill_height must be between 0.0017 and .* Check the unit"),
-        ("base,1,,,,drum.jpg", "m.csv:2: picture: this test leaves no heap to photograph"),
+        (
+            "base,1,,,,drum.jpg",
+            "m.csv:2: picture: has no measurable drum: .*drum.jpg: not a picture",
+        ),
     ],
 )
 def test_a_measurement_that_the_test_cannot_give_is_refused(
@@ -100,9 +103,9 @@ def test_a_file_of_measurements_is_the_target_of_a_drum(write_study: WriteStudy,
     assert (leading.measured.mean, leading.measured.sd, leading.measured.n) == (32.0, 1.0, 3)
 
 
-def test_photographs_of_heaps_are_no_target_of_a_drum(write_study: WriteStudy) -> None:
+def test_photographs_give_no_angle_of_a_heap_to_a_drum(write_study: WriteStudy) -> None:
     path = write_study((TUBE, DRUM), (ANGLE, '[target]\npictures = "photos"\n'))
-    with pytest.raises(InputError, match=r"target\.pictures: .*leaves no heap.*got drum"):
+    with pytest.raises(InputError, match=r"pictures: photographs give only the observable dynamic_angle or"):
         measured_target.with_measurements(load_study(path))
 
 

@@ -21,9 +21,9 @@ COMMANDS = [command.callback.__name__ for command in cli.app.registered_commands
 
 def triangle(slope: float = 0.5) -> np.ndarray:
     """Draw a dark heap on white: a triangle of a given slope."""
-    rows, columns = np.mgrid[0:300, 0:800]
-    inside = (240 - rows) < slope * (300 - np.abs(columns - 400))
-    return np.where(inside & (rows < 240), 40, 255).astype(np.uint8)
+    rows, columns = np.mgrid[0:180, 0:480]
+    inside = (144 - rows) < slope * (180 - np.abs(columns - 240))
+    return np.where(inside & (rows < 144), 40, 255).astype(np.uint8)
 
 
 @pytest.fixture(autouse=True)

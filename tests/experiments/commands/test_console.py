@@ -155,6 +155,6 @@ def test_a_command_that_a_scheduler_ends_leaves_no_process(write_study: WriteStu
                 break
         # the end comes when no process has the pipe any more
         rest = process.stderr.read()
-        assert process.wait(60) == 143
+        assert process.wait(120) == 143
     assert "Resume with: dem-warp calibrate" in rest
     assert "Traceback" not in rest

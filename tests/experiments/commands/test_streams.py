@@ -11,6 +11,7 @@ import pytest
 from commandline import refused
 
 from experiments.commands.streams import lasting_streams
+from experiments.studyfile import write_template
 
 CLOSED = """
 import os, sys
@@ -68,14 +69,14 @@ def test_a_reader_that_has_enough_gets_no_sentence(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("names", [["stdout"], ["stderr"], ["stdin", "stdout", "stderr"]])
 def test_a_closed_stream_costs_no_result(names: list[str], tmp_path: Path) -> None:
-    file = tmp_path / "ball.txt"
-    command = [sys.executable, "-c", CLOSED.format(names=names), "clump", "sphere:3", "--spheres", "1"]
-    done = subprocess.run([*command, "--out", file], capture_output=True, text=True, timeout=120)
+    command = [sys.executable, "-c", CLOSED.format(names=names), "new", "wheat"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0
     assert "Traceback" not in done.stderr
     # the file holds its own text alone: nothing that was printed took its number
-    lines = file.read_text(encoding="utf-8").splitlines()
-    assert [len(line.split()) for line in lines if not line.startswith("#")] == [4]
+    (tmp_path / "again").mkdir()
+    written = write_template("wheat", tmp_path / "again")
+    assert (tmp_path / "wheat.toml").read_bytes() == written.read_bytes()
 
 
 def test_a_file_that_is_too_large_is_refused_by_its_size(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from commandline import dem_warp, refused
 from exported_lift import COUNT, GRAIN, ROD
 from exported_lift import exported_lift as exported
 
-from dem_warp import PRESETS, ClumpShape, ContactLaws, ShapeMixture
+from dem_warp import PRESETS, ClumpShape, ContactLaws, Ledge, Material, ShapeMixture
 from dem_warp.laws.conventions import Rolling
 from dem_warp.laws.twisting import Twisting
 from dem_warp.population import SIZE_VARIANCE
@@ -28,6 +28,7 @@ from experiments.io.errors import InputError
 from experiments.studyfile import load_study
 
 SPHERE = ClumpShape.sphere(1e-3)
+LEDGE = Ledge(width=0.1, depth=0.1, fill_depth=0.1, wall_material=Material(7800.0, 70e9, 0.3))
 PROGRAMS = {"liggghts": "liggghts", "lammps": "lmp"}
 """Codes with an input in their own language, and their programs."""
 
@@ -238,10 +239,14 @@ def test_a_mechanism_and_an_option_of_the_scene_without_counterpart_are_refused_
 
 def test_another_test_and_another_code_are_refused() -> None:
     drum = load_study(Path("experiments/studies/trial/study.toml"), "bench").case({}, 1)
-    strange = ExportedTest("strange", replace(drum, scene=object()), "here")
+    strange = ExportedTest("strange", replace(drum, scene=LEDGE), "here")
     for code in ("liggghts", "yade", "deme", "mercurydpm"):
-        with pytest.raises(InputError, match="must be a lifted-cylinder"):
+        with pytest.raises(InputError, match=r"must be a lifted-cylinder.*got ledge"):
             export_input(strange, code)
+        with pytest.raises(
+            InputError, match=r"plate must have no lip: no code is given one, got lip = 0.001 m"
+        ):
+            export_input(exported("edem", plate_diameter=1.0, lip=1e-3), code)
     with pytest.raises(InputError, match=r"must be one of .*liggghts.*got fluent"):
         export_input(exported("edem"), "fluent")
 
@@ -277,8 +282,8 @@ def test_an_input_runs_and_leaves_the_heap(
 @with_programs
 def test_every_grain_is_poured_however_few_fall_at_once(code: str, tmp_path: Path) -> None:
     # so narrow that LAMMPS, which puts in whole grains, pours at three quarters of the rate
-    test = exported(code, SPHERE, grain_count=80, diameter=0.008, height=0.06)
-    assert len(_heap_of(test, code, tmp_path)) == 80
+    test = exported(code, SPHERE, grain_count=50, diameter=0.008, height=0.04)
+    assert len(_heap_of(test, code, tmp_path)) == 50
 
 
 @with_programs

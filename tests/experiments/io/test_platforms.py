@@ -136,7 +136,7 @@ def test_a_campaign_runs_in_new_processes_under_a_bare_locale(tmp_path: Path, sm
     folder = tmp_path / "Körner und mehr"
     folder.mkdir()
     (folder / "Weizen groß.toml").write_text(small_text + FEW_CASES + ENGINE, encoding="utf-8")
-    words = ("calibrate", "Weizen groß.toml", "--device", "cpu", "--workers", "2", "--out", "aus gabe ü")
+    words = ("calibrate", "Weizen groß.toml", "--device", "cpu", "--workers", "1", "--out", "aus gabe ü")
     bare = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONWARNDEFAULTENCODING": "1"}
     done = run(folder, *words, **bare)
     printed = done.stderr.decode("utf-8", "replace")

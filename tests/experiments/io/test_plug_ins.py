@@ -52,9 +52,14 @@ def faults(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     (folder / "entry_points.txt").write_text("[dem_warp.engines]\nraising = grain_faults:raising\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(site))
-        plug_ins._folders.cache_clear()
+        _forget()
         yield import_module("grain_faults")
+    _forget()
+
+
+def _forget() -> None:
     plug_ins._folders.cache_clear()
+    plug_ins._packages.cache_clear()
 
 
 def placed(text: str, faults: Any) -> bool:

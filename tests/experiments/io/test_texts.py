@@ -11,7 +11,7 @@ from commandline import refused
 
 from dem_warp.device import resolve_device
 from experiments.cli import app
-from experiments.commands.results import print_angles
+from experiments.commands.results import HEAP_COLUMNS, print_angles
 from experiments.io.errors import LONGEST_VALUE, MOST_PROBLEMS, InputError, Problem
 from experiments.io.rows import read_rows
 from experiments.io.texts import is_number, read_text
@@ -117,7 +117,7 @@ def test_a_machine_without_a_gpu_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_brackets_are_no_markup(capsys: pytest.CaptureFixture[str]) -> None:
     row = {"picture": "heap[bold].png", "left": 1.0, "right": 1.0, "mean": 1.0, "se": 0.1, "doubts": []}
-    print_angles([row], "flank")
+    print_angles([row], "Repose angles", HEAP_COLUMNS)
     assert "heap[bold].png" in capsys.readouterr().out
     assert "[red]none[blue].toml" in refused("heap", "[red]none[blue].toml", "--device", "cpu")
 

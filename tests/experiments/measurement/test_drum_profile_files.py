@@ -36,7 +36,7 @@ def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None
         ("1,2,3\n", r"p.csv:2: x: needs a unit of length"),
         (",2 mm,3 mm\n", r"p.csv:2: replicate: needs a label"),
         ("1,2 mm,3 mm\n1,2 mm,4 mm\n", r"p.csv:3: x: appears twice"),
-        ("1,0 mm,0 mm\n1,5 mm,1 mm\n", r"must span 3 stations of the drum, got 0 to 5 mm, 1 stations"),
+        ("1,0 mm,0 mm\n1,5 mm,1 mm\n", r"must span 3 stations of the drum, got 1 in all of 1 profiles"),
         ("", r"p.csv: has no rows below the names of the columns"),
         (
             "".join(f"1,{x} mm,0 mm\n" for x in (-20, -14, -8, 0, 6, 12, 18)),
@@ -87,11 +87,11 @@ def test_profiles_of_another_test_or_observable_are_refused(write_study: Callabl
     with pytest.raises(InputError, match=r'"outline" needs profiles, a file of them, or a twin'):
         profile_responses.with_profiles(bare)
     heap = load_study(write_study((ANGLE, TARGET)))
-    with pytest.raises(InputError, match=r'the "surface" of a drum .*, got surface of lifted-cylinder'):
+    with pytest.raises(InputError, match=r'the "surface" of a drum, .*, got surface of lifted-cylinder'):
         profile_responses.with_profiles(heap)
     other = load_study(write_study((TUBE, DRUM), (ANGLE, TARGET.replace('"surface"', '"mass_angle"'))))
     with pytest.raises(
-        InputError, match=r'profiles need the observable "surface" or "outline", got mass_angle'
+        InputError, match=r'profiles need the observable "surface" or "outline" or .*, got mass_angle'
     ):
         profile_responses.with_profiles(other)
 

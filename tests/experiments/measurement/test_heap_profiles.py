@@ -113,7 +113,7 @@ def test_what_shows_no_side_of_a_heap_is_refused_with_its_row(
 
 def test_a_heap_that_the_test_cannot_give_is_refused_with_file_and_pixel(tmp_path: Path) -> None:
     """The heap is drawn 400 pixels wide: with pixels of 0.1 mm it is some 10 mm high."""
-    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0), Camera(noise=0)))
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0, 200), Camera(noise=0)))
     for pixel in ("3 m", "0.1 um"):
         row = file(tmp_path, f"1,heap.png,{pixel}\n", "replicate,picture,pixel")
         with pytest.raises(
@@ -133,7 +133,7 @@ def test_a_heap_that_the_test_cannot_give_is_refused_with_file_and_pixel(tmp_pat
 def test_outlines_of_a_study_are_as_high_as_its_test_can_give(
     write_study: Callable[..., Path], tmp_path: Path
 ) -> None:
-    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0), Camera(noise=0)))
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0, 200), Camera(noise=0)))
     file(tmp_path, "1,heap.png,3 m\n", "replicate,picture,pixel")
     with pytest.raises(InputError, match=r"p.csv:2: pixel: .*must be 1.7 to 168 mm high in this test"):
         with_profiles(load_study(write_study((ANGLE, TARGET))))
@@ -149,7 +149,7 @@ def test_outlines_of_a_study_are_as_high_as_its_test_can_give(
 def test_copies_of_an_outline_are_refused_with_both_places(
     write_study: Callable[..., Path], tmp_path: Path
 ) -> None:
-    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0), Camera(noise=0)))
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0, 200), Camera(noise=0)))
     (tmp_path / "copy.png").write_bytes((tmp_path / "heap.png").read_bytes())
     rows = file(tmp_path, "1,a,heap.png,0.1 mm\n1,b,copy.png,0.1 mm\n", "replicate,view,picture,pixel")
     with pytest.raises(
@@ -176,7 +176,7 @@ def test_copies_of_an_outline_are_refused_with_both_places(
 
 
 def test_a_doubtful_outline_is_refused_with_the_doubt(tmp_path: Path) -> None:
-    save_picture(tmp_path / "lean.png", draw(DrawnHeap(24.0, 33.0), Camera(noise=0)))
+    save_picture(tmp_path / "lean.png", draw(DrawnHeap(24.0, 33.0, 200), Camera(noise=0)))
     row = file(tmp_path, "1,lean.png,0.1 mm\n", "replicate,picture,pixel")
     with pytest.raises(InputError, match=r"p.csv:2: picture: is doubtful: .*left"):
         read_heap_profiles(row, "flank", SIZE)

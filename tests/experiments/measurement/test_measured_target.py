@@ -45,7 +45,7 @@ def photographs(tmp_path: Path) -> list[Path]:
     (tmp_path / "photos").mkdir()
     paths = [tmp_path / "photos" / f"heap-{number}.png" for number in range(3)]
     for path, slope in zip(paths, (27.0, 29.0, 31.0), strict=True):
-        save_picture(path, draw(DrawnHeap(slope, slope), Camera(noise=0)))
+        save_picture(path, draw(DrawnHeap(slope, slope, 200), Camera(noise=0)))
     return paths
 
 
@@ -70,14 +70,14 @@ def test_pictures_are_measured_with_the_fit_of_the_study(write_study: WriteStudy
 
 
 def test_a_picture_in_doubt_is_left_out_with_its_reason(from_source, photographs: list[Path]) -> None:
-    lean = draw(DrawnHeap(24.0, 33.0), Camera(noise=0))
+    lean = draw(DrawnHeap(24.0, 33.0, 200), Camera(noise=0))
     save_picture(photographs[1], lean)
     study, notes = with_measurements(from_source('pictures = "photos"'))
     angles = [measure_photograph(path, "flank").mean for path in (photographs[0], photographs[2])]
     assert study.target.leading.measured == Sample.of(angles)
     assert len(notes) == 1
     assert re.fullmatch(r"left out: .*heap-1.png: doubtful: lean: .*", notes[0])
-    save_picture(photographs[0], draw(DrawnHeap(33.0, 24.0), Camera(noise=0)))
+    save_picture(photographs[0], draw(DrawnHeap(33.0, 24.0, 200), Camera(noise=0)))
     with pytest.raises(InputError, match=r"target.pictures: needs two measured heaps .*doubtful.*, got 1"):
         with_measurements(from_source('pictures = "photos"'))
     kept, notes = with_measurements(from_source('pictures = "photos"\nkeep_doubtful = true'))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from analytic_heaps import AnalyticHeaps, study_with
+from analytic_heaps import AnalyticHeaps, twin_of_one_angle
 from axe_playwright_python.sync_playwright import Axe
 from cone_engine import resting
 from discoveries import made_discovery
@@ -16,7 +16,7 @@ from doe.discrepancy import Settings, Verdict
 from experiments.calibrate import Campaign, calibrate
 from experiments.report import HeapPicture, SolidHeap, discovery, kit, render_page
 from experiments.report.kit.theme import DARK, LIGHT
-from experiments.studyfile import Study, load_study
+from experiments.studyfile import Study
 
 pytestmark = pytest.mark.program("chromium")
 
@@ -69,7 +69,7 @@ def files(
         tmp_path_factory.mktemp("pages"),
         HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8)),
     )
-    study = study_with(load_study(None, "bench"), selection={"keep": ("E", "F")})
+    study = twin_of_one_angle()
     found: Campaign = calibrate(study, AnalyticHeaps())
     monkeypatch = pytest.MonkeyPatch()
     monkeypatch.setattr(kit.html, "get_plotlyjs", lambda: plotly)

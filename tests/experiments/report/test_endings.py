@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 import pytest
-from analytic_heaps import AnalyticHeaps, study_with
+from analytic_heaps import AnalyticHeaps, study_with, twin_of_one_angle
 from page_reader import Page
 
 from experiments.calibrate import Outcome, calibrate
@@ -80,7 +80,7 @@ def test_one_and_three_kept_factors_have_their_charts(names: tuple[str, ...]) ->
 
 
 def test_a_twin_study_tells_the_truth() -> None:
-    study = study_with(load_study(None, "bench"), selection={"keep": ("E", "F")})
+    study = twin_of_one_angle()
     campaign = calibrate(study, AnalyticHeaps())
     page = Page(render_page(campaign, study))
     truth = campaign.optimum.truth

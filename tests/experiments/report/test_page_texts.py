@@ -7,7 +7,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from analytic_heaps import AnalyticHeaps, study_with
+from analytic_heaps import AnalyticHeaps, twin_of_one_angle
 from page_reader import Page
 
 from experiments.calibrate import Campaign, calibrate
@@ -17,7 +17,7 @@ from experiments.report.kit.latex import latex_text
 from experiments.report.kit.numbers import prose
 from experiments.report.paper_text import methods_paragraph, paper_table, pastes
 from experiments.report.verdict import verdict_sentence
-from experiments.studyfile import Study, load_study
+from experiments.studyfile import Study
 
 NUMBER = re.compile(r"(?<![\w.])[−-]?\d+\.\d+")
 """A number with decimals, as sentences have it."""
@@ -70,7 +70,7 @@ def test_cautions_come_before_the_values(page_text: str) -> None:
 
 
 def test_a_bench_campaign_is_cautioned() -> None:
-    study = study_with(load_study(None, "bench"), selection={"keep": ("E", "F")})
+    study = twin_of_one_angle()
     text = caution_texts(calibrate(study, AnalyticHeaps()), study)
     assert "The target was simulated, not measured." in text
     assert f"fewer than {FEW_GRAINS} grains" in text
@@ -106,7 +106,7 @@ def test_the_values_to_enter_are_those_of_every_factor(campaign: Campaign, study
 
 
 def test_the_values_to_enter_hold_the_fixed_ones_and_the_simulated_modulus() -> None:
-    study = study_with(load_study(None, "bench"), selection={"keep": ("E", "F")})
+    study = twin_of_one_angle()
     page = Page(render_page(calibrate(study, AnalyticHeaps()), study))
     rows = {row[0][0]: row for row in page.rows("fixed-values")}
     case = study.case({}, 1)

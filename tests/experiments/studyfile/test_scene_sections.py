@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from dem_warp import DrawDown, Drum, Hopper
-from experiments.io.errors import StudyError
-from experiments.studyfile import load_study
+from dem_warp import SCENES, DrawDown, Drum, Hopper
+from experiments.io.errors import InputError, StudyError
+from experiments.studyfile import load_study, write_template
 from experiments.studyfile.loading import BUCKWHEAT
 
 WriteStudy = Callable[..., Path]
@@ -99,3 +99,17 @@ def test_a_grain_of_several_spheres_can_be_drawn_out(write_study: WriteStudy) ->
     base = load_study(write_study((sphere, clump))).case({}, seed=1).grains.shape
     longer = load_study(write_study((sphere, f"{clump}\nelongation = 0.3"))).case({}, seed=1).grains.shape
     assert longer == base.elongated(0.3) != base
+
+
+@pytest.mark.parametrize("test", SCENES)
+def test_a_new_study_may_be_of_any_test(tmp_path: Path, test: str) -> None:
+    study = load_study(write_template("grain", tmp_path, test))
+    assert study.case({}, seed=1).scene.name == test
+    [response] = study.target.responses
+    assert response.observable in {each.column for each in study.measurable} | {"angle"}
+
+
+def test_a_new_study_of_an_unknown_test_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"--test: must be one of lifted-cylinder, poured-heap, ledge.*pile"):
+        write_template("grain", tmp_path, "pile")
+    assert not list(tmp_path.iterdir())

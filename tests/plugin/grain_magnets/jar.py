@@ -5,7 +5,7 @@ from math import pi
 from typing import Annotated, Any, ClassVar
 
 from dem_warp import Material, Parameter, PouredController, PouredScene
-from dem_warp.scenes.poured_controller import Phase
+from dem_warp.scenes.phases import Phase
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Decision, SceneState
 from dem_warp.walls import Cylinder, Disc

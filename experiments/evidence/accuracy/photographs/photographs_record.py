@@ -23,7 +23,7 @@ from experiments.evidence.accuracy.photographs.sampling import (
     photograph_in_hard_light,
 )
 from experiments.evidence.accuracy.photographs.without import picture_without_heap
-from imaging import PictureError, ReposeAngle, measure, overlay, read_picture, save_picture
+from imaging import PictureError, ReposeAngle, View, measure, overlay, read_picture, save_picture
 from imaging.geometry import Picture
 
 COLUMNS = (
@@ -36,10 +36,10 @@ Task = tuple[Callable[[Any], tuple[Row, Picture]], Any]
 """Function that measures one picture, and the seed or the file of the picture."""
 
 
-def measured(picture: Picture) -> tuple[str, ReposeAngle | None, str]:
+def measured(picture: Picture, view: View | None = None) -> tuple[str, ReposeAngle | None, str]:
     """Outcome (measured, marked or refused), the angle, and why it is not simply measured."""
     try:
-        angle = measure(picture)
+        angle = measure(picture, view=view)
     except PictureError as error:
         return "refused", None, f"{error.problem}, got {error.value}"
     if angle.doubts:
@@ -57,9 +57,9 @@ def in_hard_light(seed: int) -> tuple[Row, Picture]:
     return row_of(photograph_in_hard_light(seed), seed)
 
 
-def row_of(shot: Photograph, seed: int) -> tuple[Row, Picture]:
+def row_of(shot: Photograph, seed: int, view: View | None = None) -> tuple[Row, Picture]:
     """Row of a photograph, and the picture with what was seen in it."""
-    outcome, angle, why = measured(shot.picture)
+    outcome, angle, why = measured(shot.picture, view)
     row: Row = {
         "kind": shot.setting,
         "seed": seed,

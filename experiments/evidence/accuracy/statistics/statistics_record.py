@@ -11,18 +11,22 @@ import typer
 from experiments.evidence.accuracy.statistics.agreements import agreements
 from experiments.evidence.accuracy.statistics.coverage import AT_LEAST, AT_MOST, SLACK, Figure, figures_table
 from experiments.evidence.accuracy.statistics.direct_coverage import direct_readings
+from experiments.evidence.accuracy.statistics.fidelity import fidelity
 from experiments.evidence.accuracy.statistics.means import means
+from experiments.evidence.accuracy.statistics.plans import plans
 from experiments.evidence.accuracy.statistics.screenings import screenings
-from experiments.evidence.accuracy.statistics.surface_coverage import directions, joint_fits, surfaces
+from experiments.evidence.accuracy.statistics.surface_coverage import intervals, joint_fits, surfaces
 
 THEMES: dict[str, Callable[[], Iterator[Figure]]] = {
     "surfaces": surfaces,
     "joint_fits": joint_fits,
     "direct_readings": direct_readings,
-    "directions": directions,
+    "intervals": intervals,
     "means": means,
     "screenings": screenings,
     "agreements": agreements,
+    "plans": plans,
+    "fidelity": fidelity,
 }
 """Parts of the record, each a file of its own."""
 
@@ -30,10 +34,12 @@ TITLES = {
     "surfaces": "Surfaces and their regions",
     "joint_fits": "Joint fits",
     "direct_readings": "Joint fits with direct readings",
-    "directions": "Directions of a joint fit",
+    "intervals": "Factors of a joint fit, each by itself",
     "means": "Comparisons of means",
     "screenings": "Screening",
     "agreements": "Agreement",
+    "plans": "Plans of tests",
+    "fidelity": "Surfaces moved from a cheaper scale",
 }
 
 ROUNDING = 1e-9
@@ -59,7 +65,8 @@ def page(folder: Path = FOLDER) -> str:
         ".932 to .968 (`doe.samples.two_errors`). n: measurements behind a target. Spread: standard "
         "deviation of a measurement over that of a run. Read: factors measured by themselves, by n "
         "readings each or with a stated error; model: sd of the model's parameter over the standard error of "
-        "the readings (drawn on 2026-11-27).",
+        "the readings (drawn on 2026-11-27). Plans: on 2026-11-28, on two cores; on the "
+        "engine, twins of heaps of 150 grains.",
     ]
     for theme, title in TITLES.items():
         table = pd.read_csv(folder / f"{theme}.csv")

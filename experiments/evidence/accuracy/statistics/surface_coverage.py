@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import optimize, special, stats
+from numpy.typing import NDArray
+from scipy import special, stats
 
-from doe import Design, Factor, Goal, Sample, central_composite, fit_surface, joint_fit
-from doe.response.joint_fit import PULL
-from doe.response.quadratic import QuadraticForm
+from doe import Factor, Goal, Sample, central_composite, fit_surface, joint_fit
 from doe.samples.simultaneous import Simultaneous
 from doe.samples.two_errors import TwoErrors
 from experiments.evidence.accuracy.statistics.coverage import (
@@ -49,8 +48,11 @@ CURVED = {
 }
 """True slopes, interaction and squares over the standard deviation of a run."""
 
-PAIRS, PAIR_TRIALS = ((2, 2), (2, 6), (3, 2), (3, 3), (5, 2), (10, 6)), 1_600
-"""Measurements and responses of the directions, and trials of each."""
+PAIRS, SLOPES, INTERVAL_TRIALS = ((2, 2), (2, 6), (3, 3), (5, 2), (10, 6)), (2.0, 12.0), 800
+"""Measurements and responses of the intervals, slopes over the error of a run, and trials of each."""
+
+RESOLUTION = 200
+"""Cells along each factor of the intervals: a tenth of the narrowest."""
 
 
 def surfaces() -> Iterator[Figure]:
@@ -65,10 +67,10 @@ def joint_fits() -> Iterator[Figure]:
         yield from _joint(correlation, 10 + number)
 
 
-def directions() -> Iterator[Figure]:
-    """Yield the coverage of the half widths along the directions of a joint fit."""
-    for number, (count, responses) in enumerate(PAIRS):
-        yield _direction(count, responses, 20 + number)
+def intervals() -> Iterator[Figure]:
+    """Yield the coverage of the intervals of a joint fit's factors, each by itself."""
+    for number, ((count, responses), slope) in enumerate(product(PAIRS, SLOPES)):
+        yield _interval(count, responses, slope, 20 + number)
 
 
 def _matrix(coded: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -81,9 +83,6 @@ HAT = MATRIX @ np.linalg.pinv(MATRIX)
 
 LEVERAGE = float((_matrix(POINT) @ np.linalg.inv(MATRIX.T @ MATRIX) @ _matrix(POINT).T)[0, 0])
 """Variance of the fitted mean at the true setting, over that of a run."""
-
-NEAR = 1e-4
-"""Relative difference that two searches for the smallest chi2 may leave."""
 
 QUADRATURE = 24
 """Nodes for what the errors of the fits share."""
@@ -238,76 +237,20 @@ def _through_joint_fit(
     return joint_fit(goals, resolution=40).agrees(point)
 
 
-@dataclass(frozen=True)
-class _Plane:
-    """A fitted plane: estimated coefficients and their covariance."""
-
-    coefficients: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    residual_df: float
-    design: Design = DESIGN
-
-    @property
-    def quadratic_form(self) -> QuadraticForm:
-        return QuadraticForm(float(self.coefficients[0]), self.coefficients[1:], np.zeros((2, 2)))
-
-    def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        points = np.atleast_2d(np.asarray(coded, dtype=np.float64))
-        rows = np.column_stack([np.ones(len(points)), points])
-        return rows @ self.coefficients, np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows))
-
-
-def _direction(count: int, responses: int, number: int) -> Figure:
-    """Return what ``directions.half_width`` covers: the true setting along both directions of a joint fit."""
-    rng = generator("surfaces", number)
-    matrix = np.column_stack([np.ones(len(DESIGN.coded)), DESIGN.points.to_numpy()])
-    inverse, df = np.linalg.inv(matrix.T @ matrix), len(matrix) - 3.0
-    shares = np.empty(PAIR_TRIALS)
-    for trial in range(PAIR_TRIALS):
+def _interval(count: int, responses: int, slope: float, number: int) -> Figure:
+    """Return what ``JointFit.intervals`` hold: the true value of each factor, others free."""
+    rng, held = generator("surfaces", number), np.empty((INTERVAL_TRIALS, 2))
+    for trial in range(INTERVAL_TRIALS):
         angle = np.pi * (np.arange(responses) + rng.uniform(size=responses)) / responses
-        slopes = 12.0 * np.column_stack([np.cos(angle), np.sin(angle)])
-        noise = rng.standard_normal((responses, len(matrix)))
-        found = noise @ matrix @ inverse
-        variance = ((noise - found @ matrix.T) ** 2).sum(axis=1) / df
-        found[:, 1:] += slopes
-        measured = (slopes @ POINT[0])[:, None] + rng.standard_normal((responses, count))
-        targets = [Sample.of(row) for row in measured]
-        planes = [_Plane(row, part * inverse, df) for row, part in zip(found, variance, strict=True)]
-        point, vectors, reach = _half_widths(planes, targets)
-        if trial < JOINT_CHECKED:
-            pairs = zip(planes, targets, strict=True)
-            fit = joint_fit({str(name): Goal(*pair) for name, pair in enumerate(pairs)}, resolution=12)
-            require_same("directions", np.abs(vectors.T), fit.directions[DESIGN.names].abs(), NEAR)
-            require_same("directions", reach, fit.directions["half_width"], NEAR)
-            require_same("directions", point, fit.coded_point, NEAR)
-        shares[trial] = (np.abs(vectors.T @ (POINT[0] - point)) <= reach).mean()
-    return _figure("directions.half_width", f"{responses} responses, n = {count}", count, shares)
-
-
-def _half_widths(
-    planes: list[_Plane], targets: list[Sample]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the point of the smallest chi2, the directions there and the half widths along them."""
-    coefficients = np.array([plane.coefficients for plane in planes])
-    covariance = np.array([plane.covariance for plane in planes])
-    goal, second = np.array([(target.mean, target.se**2) for target in targets]).T
-
-    def first(point: NDArray[np.float64]) -> NDArray[np.float64]:
-        row = np.array([1.0, *point])
-        return np.asarray(row @ covariance @ row)
-
-    def chi2(point: NDArray[np.float64]) -> float:
-        gap = coefficients @ np.array([1.0, *point]) - goal
-        return float((gap**2 / (first(point) + second)).sum() + PULL * point @ point)
-
-    start = np.linalg.lstsq(coefficients[:, 1:], goal - coefficients[:, 0], rcond=None)[0]
-    point = optimize.minimize(chi2, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-9}).x
-    error = first(point)
-    slopes = coefficients[:, 1:] / np.sqrt(error + second)[:, None]
-    vectors = np.linalg.eigh(slopes.T @ slopes)[1][:, ::-1]
-    rules = [
-        TwoErrors(plane.residual_df, float(target.df)) for plane, target in zip(planes, targets, strict=True)
-    ]
-    together = Simultaneous(rules, second, np.eye(len(planes)), error[None], 0.05)
-    reach = [together.half_width(coefficients[:, 1:], vector, error) for vector in vectors.T]
-    return point, vectors, np.array(reach)
+        slopes = slope * np.column_stack([np.cos(angle), np.sin(angle)])
+        goals: dict[str, Goal] = {}
+        for row in slopes:
+            runs = DESIGN.points.to_numpy() @ row + rng.standard_normal(len(MATRIX))
+            measured = POINT[0] @ row + rng.standard_normal(count)
+            goals[str(len(goals))] = Goal(fit_surface(DESIGN, runs), Sample.of(measured))
+        found = joint_fit(goals, resolution=RESOLUTION).intervals
+        held[trial] = (found["low"] <= POINT[0]) & (POINT[0] <= found["high"])
+    case = f"{responses} responses, n = {count}, slopes of {slope:g} errors"
+    shares = held.mean(axis=1)
+    found, spread = float(shares.mean()), float(shares.std())
+    return Figure("JointFit.intervals", case, 0.95, AT_LEAST, found, len(shares), spread)

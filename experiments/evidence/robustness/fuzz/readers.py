@@ -37,7 +37,13 @@ from experiments.grains.clumps.clump_maker import ClumpRequest, make_clump
 from experiments.io.errors import InputError
 from experiments.journal.previews import Previews, read_preview
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
+from experiments.measurement.profile_files import (
+    read_drum_profiles,
+    read_force_curves,
+    read_heap_profiles,
+    read_press_curves,
+    read_shear_points,
+)
 from experiments.measurement.value_limits import ValueLimits
 from experiments.studyfile import load_study
 from imaging import PictureError, measure_photograph
@@ -107,11 +113,17 @@ def measured(folder: Path) -> Reader:
 
 
 def profiles(folder: Path) -> Reader:
-    """Profiles of drums and of heaps, heaps with a picture."""
+    """Profiles of drums and of heaps, heaps with a picture, curves of a press and a tool, points of shear."""
     (folder / "heap.png").write_bytes(_picture(".png"))
     rows = [f"{n},{x} mm,{n - 0.3 * x:.1f} mm" for n in (1, 2, 3) for x in range(-18, 19, 6)]
     heap = [f"1,,{x} mm,{max(9 - 0.5 * abs(x), 0):.1f} mm,," for x in range(-20, 21, 4)]
+    press = [f"{n},{0.01 * (x + n * x**2):.4f},{x**2} kPa" for n in (1, 2, 3) for x in (0, 1, 2, 3, 2, 0)]
+    shear = [f"{n},{x} kPa,{0.6 * x + 0.1 * n} kPa" for n in (1, 2, 3) for x in (2, 4, 6, 9)]
+    tool = [f"{n},{x} mm,{0.1 * n * x} N" for n in (1, 2, 3) for x in range(6)]
     texts = {
+        "tool.csv": "\n".join(["replicate,depth,force", *tool]),
+        "shear.csv": "\n".join(["replicate,normal,shear", *shear]),
+        "press.csv": "\n".join(["replicate,strain,stress", *press]),
         "drum.csv": "\n".join(["replicate,x,z", *rows]),
         "heap.csv": "\n".join(["replicate,view,x,z,picture,pixel", *heap, "2,a,,,heap.png,0.2 mm"]),
     }
@@ -119,6 +131,12 @@ def profiles(folder: Path) -> Reader:
     def read(path: Path) -> object:
         if path.name.startswith("drum"):
             return read_drum_profiles(path, 0.03)
+        if path.name.startswith("press"):
+            return read_press_curves(path, 9e3)
+        if path.name.startswith("tool"):
+            return read_force_curves(path, 5e-3)
+        if path.name.startswith("shear"):
+            return read_shear_points(path, 9e3)
         return read_heap_profiles(path, "flank", ValueLimits(1e-4, 0.2, math.inf, 1e3))
 
     return Reader({name: text.encode() for name, text in texts.items()}, read)

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import pandas as pd
 import typer
 
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.campaign import Campaign
 from experiments.commands.console import clear_errors
 from experiments.evidence.studies.buckwheat.records.paper_page import RECORD, draw_heaps, write_record
 from experiments.evidence.studies.buckwheat.replay.replay import Replay

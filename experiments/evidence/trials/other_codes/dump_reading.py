@@ -14,7 +14,7 @@ import numpy as np
 from dem_warp import Case, ClumpShape, LiftedCylinder
 from dem_warp.model import Grains, WorldSetup
 from dem_warp.scenes.lifted_cylinder import LiftController
-from dem_warp.scenes.poured_scene import default_skin
+from dem_warp.scenes.walled_scene import default_skin
 from dem_warp.view import WorldView, overviews
 from experiments.cases.engines.program import AnswerError
 
@@ -195,7 +195,7 @@ class _Watch:
             positions=positions,
             velocities=velocities,
             masses=self._masses,
-            impulse=self._impulse,
+            impulses=np.array([[0.0, 0.0, self._impulse]]),
             rms_speed=float(rms[0]),
             fastest=float(fastest[0]),
             highest=float(highest[0]),

@@ -1,12 +1,12 @@
 """Contacts of grains, found anew from their poses: every pair of spheres, every sphere and wall."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem_warp.model import WorldSetup
-from dem_warp.walls import Cylinder, Plane
+from dem_warp.walls import Cone, Cylinder, Plane
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Touching:
     """Number of the pair among all that may ever touch."""
     first: np.ndarray
     second: np.ndarray
-    """Grains; a wall is the number after the last grain."""
+    """Grains; walls have the numbers after the last grain."""
     normal: np.ndarray
     """Unit vectors from the second to the first, shape (n, 3)."""
     overlap: np.ndarray
@@ -51,8 +51,8 @@ class ContactFinder:
         centers = positions[self.owner] + arms
         parts = [self._pairs(centers, arms)]
         offset = len(self.first)
-        for wall in self.walls:
-            parts.append(self._on_wall(wall, offset, centers, arms))
+        for number, wall in enumerate(self.walls):
+            parts.append(self._on_wall(wall, self.wall_body + number, offset, centers, arms))
             offset += len(self.owner)
         names = Touching.__dataclass_fields__
         return Touching(
@@ -74,7 +74,14 @@ class ContactFinder:
         radius, mass = ra * rb / (ra + rb), ma * mb / (ma + mb)
         return Touching(hit, self.owner[a], self.owner[b], normal, overlap, radius, mass, levers)
 
-    def _on_wall(self, wall: object, offset: int, centers: np.ndarray, arms: np.ndarray) -> Touching:
+    def move_walls(self, paths: np.ndarray) -> None:
+        """Move the walls, (walls, 3) [m]."""
+        moved = zip(self.walls, paths, strict=True)
+        self.walls = [replace(wall, point=tuple(wall.point + path)) for wall, path in moved]
+
+    def _on_wall(
+        self, wall: object, body: int, offset: int, centers: np.ndarray, arms: np.ndarray
+    ) -> Touching:
         if isinstance(wall, Plane):
             normals = np.broadcast_to(wall.axis, centers.shape)
             gap = (centers - wall.point) @ np.array(wall.axis)
@@ -83,13 +90,20 @@ class ContactFinder:
             distance = np.linalg.norm(out, axis=1)
             normals = -out / np.maximum(distance, 1e-300)[:, None]
             gap = wall.radius - distance
+        elif isinstance(wall, Cone):  # from outside, above a tip at `point`
+            off, flank = centers - wall.point, np.array([0.0, 0.0, wall.length])
+            flank = flank + off * [1.0, 1.0, 0.0] * (wall.upper_radius / np.hypot(off[:, :1], off[:, 1:2]))
+            flank /= np.hypot(wall.length, wall.upper_radius)
+            off -= flank * np.maximum((off * flank).sum(axis=1), 0.0)[:, None]
+            gap = np.linalg.norm(off, axis=1)
+            normals = off / gap[:, None]
         else:
-            rule = "walls are planes and upright cylinders from inside"
+            rule = "walls are planes, upright cylinders from inside and cones on their tip"
             raise ValueError(f"ContactFinder: {rule}, got {wall!r}")
         hit = np.flatnonzero(gap < self.radii)
         overlap, normal = self.radii[hit] - gap[hit], normals[hit]
         lever = arms[hit] + normal * (0.5 * overlap - self.radii[hit])[:, None]
-        owner, wall_body = self.owner[hit], np.full(len(hit), self.wall_body)
+        owner, wall_body = self.owner[hit], np.full(len(hit), body)
         levers = np.stack([lever, np.zeros_like(lever)])
         radius, mass = self.radii[hit], self.masses[owner]
         return Touching(offset + hit, owner, wall_body, normal, overlap, radius, mass, levers)

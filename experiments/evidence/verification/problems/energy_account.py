@@ -55,8 +55,9 @@ class Moment:
 
 
 class EnergyAccount:
-    """Energies [J] of a world with one contact law for all and walls at rest, step by step.
+    """Energies [J] of a world with one contact law for all, step by step.
 
+    `wall_velocities` [m/s], 0 at first, are those of walls that move, from the step on that was seen last.
     The account books by a law of its own, by default that of the world. `force_gap` [N] and `torque_gap`
     [N m] are the largest differences between a force or torque of the law and what moved a grain, over all
     steps and grains; `largest_force` and `largest_torque` are the largest of these themselves.
@@ -68,6 +69,7 @@ class EnergyAccount:
         self.setup = setup
         self.law = law or setup.contacts[0]
         self.finder = ContactFinder(setup)
+        self.wall_velocities = np.zeros((len(setup.walls), 3))
         self.lost = dict.fromkeys(LOST, 0.0)
         self.force_gap = self.torque_gap = self.largest_force = self.largest_torque = 0.0
         self._displacements = np.zeros((self.finder.candidate_count, 3))
@@ -83,6 +85,8 @@ class EnergyAccount:
     def see(self, state: Any) -> None:
         """Book the step that ends in a state of the solver."""
         now = Motion.of(state, self.setup.grains.count)
+        if self._last and self.wall_velocities.any():
+            self.finder.move_walls(self.wall_velocities * self.setup.time_step)
         moment = self._moment(now)
         if self._last:
             before, earlier, stored = self._last
@@ -99,9 +103,9 @@ class EnergyAccount:
     # ---- the law -------------------------------------------------------------------------------------------
 
     def _slip_velocities(self, touching: Touching, now: Motion) -> np.ndarray:
-        """Velocity of the first surface against the second at each contact [m/s]; walls are at rest."""
-        velocities = np.vstack([now.velocities, np.zeros(3)])
-        spins = np.vstack([now.spins, np.zeros(3)])
+        """Velocity of the first surface against the second at each contact [m/s]."""
+        velocities = np.vstack([now.velocities, self.wall_velocities])
+        spins = np.vstack([now.spins, np.zeros_like(self.wall_velocities)])
         first = velocities[touching.first] + np.cross(spins[touching.first], touching.levers[0])
         return first - velocities[touching.second] - np.cross(spins[touching.second], touching.levers[1])
 
@@ -155,13 +159,14 @@ class EnergyAccount:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Force [N], torque [N m] and largest rolling torque [N m] of each grain."""
         count = self.setup.grains.count
-        forces, torques, most = np.zeros((count + 1, 3)), np.zeros((count + 1, 3)), np.zeros(count + 1)
+        bodies = count + len(self.wall_velocities)
+        forces, torques, most = np.zeros((bodies, 3)), np.zeros((bodies, 3)), np.zeros(bodies)
         sides = ((touching.first, touching.levers[0], 1.0), (touching.second, touching.levers[1], -1.0))
         for grains, levers, sign in sides:
             np.add.at(forces, grains, sign * force)
             np.add.at(torques, grains, sign * np.cross(levers, force))
             np.add.at(most, grains, resisted * np.linalg.norm(levers, axis=1))
-        return forces[:-1], torques[:-1], most[:-1]
+        return forces[:count], torques[:count], most[:count]
 
     def _rolling(self, now: Motion, torques: np.ndarray, most: np.ndarray) -> np.ndarray:
         """Torque [N m] by which rolling resistance, `most` at the most, changes each spin; it may stop it."""

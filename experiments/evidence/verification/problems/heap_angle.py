@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dem_warp import Case, CaseResult, LiftedCylinder, simulate
-from dem_warp.scenes.poured_scene import default_skin
+from dem_warp.scenes.walled_scene import default_skin
 from dem_warp.walls import Mesh, Wall
 from doe import Comparison, Sample, compare_means
 from experiments.evidence.verification.check import Curve, Plot, Result, Row, absolute_row
@@ -48,7 +48,7 @@ class LiftedMesh(LiftedCylinder):
 
     def walls(self, reach: float) -> tuple[Wall, ...]:
         """Return the plate and the tube."""
-        return self.plate, Mesh.tube(self.diameter / 2, self.height, SEGMENTS)
+        return super().walls(reach)[0], Mesh.tube(self.diameter / 2, self.height, SEGMENTS)
 
 
 def with_numerics(case: Case, **changes: Any) -> Case:

@@ -14,7 +14,7 @@ import pytest
 from commandline import dem_warp
 from small_study import ANGLE, TUBE
 
-from dem_warp import Case, CaseResult
+from dem_warp import SCENES, Case, CaseResult
 from dem_warp.clumps import ClumpShape
 from experiments.cases.engines.contract import command_program, heap_result, read_heap, write_case
 from experiments.cases.engines.engine import NO_ANSWER
@@ -22,7 +22,7 @@ from experiments.cases.engines.engines import engine_of
 from experiments.cases.engines.program import AnswerError, ProgramEngine
 from experiments.cases.engines.surfaces import triangles_of
 from experiments.io.errors import InputError
-from experiments.studyfile import Study, load_study
+from experiments.studyfile import Study, load_study, write_template
 from imaging import heap_angle
 
 HOPPER = '[scene.hopper]\ndiameter = "28 mm"\nfill_depth = "16 mm"\noutlet = "20 mm"\n'
@@ -42,6 +42,16 @@ def run_one(study: Study, folder: Path, way: str, seed: int = 1, **limits: float
 
 def seeds_run(folder: Path) -> list[int]:
     return list(map(int, (folder / "runs.txt").read_text().split()))
+
+
+@pytest.mark.parametrize("test", SCENES)
+def test_a_program_is_given_every_test(tmp_path: Path, test: str) -> None:
+    case = load_study(write_template("grain", tmp_path, test)).case({}, seed=1)
+    write_case(case, tmp_path / "case")
+    document = json.loads((tmp_path / "case" / "case.json").read_text())
+    assert document["scene"]["kind"] == test
+    assert set(document["stop"]) == {"rest_speed", "rest_time"}
+    assert len(document["walls"]) == len(list((tmp_path / "case").glob("wall-*.stl"))) > 0
 
 
 def test_a_case_is_written_in_si_with_its_clump_and_its_walls(write_study: Write, tmp_path: Path) -> None:
@@ -158,7 +168,7 @@ def test_a_program_is_ended_at_its_time_limit(small_study: Study, tmp_path: Path
     started = time.monotonic()
     result = run_one(small_study, tmp_path, "sleep", time_limit=1.0)
     assert (result.status, "its time limit of 1 s" in result.reason) == (NO_ANSWER, True)
-    assert time.monotonic() - started < 60.0, "the program sleeps for ten minutes"
+    assert time.monotonic() - started < 300.0, "the program sleeps for ten minutes"
 
 
 def test_a_finished_case_is_not_run_twice_and_a_failed_one_is(small_study: Study, tmp_path: Path) -> None:
@@ -179,10 +189,10 @@ def test_an_interrupt_ends_the_programs_and_loses_no_finished_case(
     def interrupt(index: int, result: CaseResult) -> None:
         raise KeyboardInterrupt
 
-    before = threading.active_count()
+    before = set(threading.enumerate())  # those of other tests may end at any time
     with pytest.raises(KeyboardInterrupt):
         engine("sleep-odd", workers=2)(cases, on_result=interrupt, checkpoint=folder)
-    assert threading.active_count() == before
+    assert set(threading.enumerate()) <= before
     assert sorted(seeds_run(tmp_path)) in ([1, 2], [2])
     run = engine("sleep-odd", workers=1, time_limit=1.0)(cases, checkpoint=folder)
     assert [result.status for result in run] == ["finished", NO_ANSWER]

@@ -132,19 +132,16 @@ def at_rest(result: CaseResult) -> bool:
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_the_real_code_ends_in_a_heap(write_study: Write, name: str) -> None:
+def test_the_real_code_ends_in_a_heap_the_same_for_a_seed_and_another_for_another(
+    write_study: Write, name: str
+) -> None:
     study = study_for(write_study, name)
-    heap = simulate_heap(study, {"E": 0.5}, seed=3)
+    heap = simulate_heap(study, {"E": 0.5}, seed=1)
     assert heap.result.status == "finished", heap.reason
     assert len(heap.result.sphere_radii) == 30
     assert at_rest(heap.result)
     assert heap.result.sphere_radii.mean() == pytest.approx(0.002, rel=0.03)
     # The spheres' 5 % spread of 30: a part of 0.01 of their mean.
-
-
-@pytest.mark.parametrize("name", REAL)
-def test_the_same_seed_is_the_same_heap_and_another_is_another(write_study: Write, name: str) -> None:
-    study = study_for(write_study, name)
-    first, again, other = (simulate_heap(study, {}, seed).result for seed in (1, 1, 2))
-    np.testing.assert_array_equal(first.sphere_centers, again.sphere_centers)
-    assert first.sphere_centers.tolist() != other.sphere_centers.tolist()
+    again, other = (simulate_heap(study, {"E": 0.5}, seed).result for seed in (1, 2))
+    np.testing.assert_array_equal(heap.result.sphere_centers, again.sphere_centers)
+    assert heap.result.sphere_centers.tolist() != other.sphere_centers.tolist()

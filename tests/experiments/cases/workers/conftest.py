@@ -1,4 +1,4 @@
-"""A cluster of two workers on this machine, for all tests."""
+"""A cluster of two workers on this machine, for the tests of one file."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,7 @@ from experiments.cases import Resources, Workers, open_workers
 from experiments.studyfile.cluster_section import ClusterSection
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def two_workers() -> Iterator[Workers]:
     """Two workers of Dask on the CPU."""
     with open_workers(Resources(cluster=ClusterSection(workers=2, gpu=False))) as workers:

@@ -1,5 +1,6 @@
 """Batches before they run: predicted costs, what fits a device, and what becomes of a batch that fails."""
 
+import gc
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,12 @@ from experiments.cases.workers.call_results import CallResults, ExpectedProgress
 from experiments.studyfile import Study, load_study
 
 Write = Callable[..., Path]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _young() -> None:
+    """Leave what earlier tests left out of the collections between two attempts."""
+    gc.freeze()
 
 
 @pytest.fixture

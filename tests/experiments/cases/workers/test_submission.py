@@ -54,9 +54,9 @@ def test_jobs_that_are_refused_end_the_command_in_the_message_of_the_batch_syste
     """A process of its own, as Dask would print its tracebacks when that ends."""
     path = install(tmp_path / "bin" / "sbatch", f"#!/bin/sh\necho '{REFUSES}' >&2; exit 1")
     out = tmp_path / "out"
-    words = ["calibrate", str(write_study()), "--cluster", str(profile), "--out", str(out)]
+    words = ["heap", str(write_study()), "--cluster", str(profile), "--out", str(out)]
     command, environment = [sys.executable, "-c", PROGRAM, *words], os.environ | {"PATH": str(path)}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120)
     assert done.returncode == 2
     assert f"sbatch refuses the jobs: {REFUSES}" in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
@@ -71,7 +71,7 @@ def test_ctrl_c_ends_a_command_whose_jobs_wait_as_any_other(
     os.mkfifo(taken)
     path = install(tmp_path / "bin" / "sbatch", f"#!/bin/sh\necho yes > {taken}; echo Submitted batch job 7")
     (path / "scancel").symlink_to("/bin/true")
-    words = ["calibrate", str(write_study()), "--cluster", str(profile), "--out", str(tmp_path / "out")]
+    words = ["heap", str(write_study()), "--cluster", str(profile), "--out", str(tmp_path / "out")]
     # what a test is started from may ignore Ctrl-C
     program = f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {PROGRAM}"
     with subprocess.Popen(
@@ -79,12 +79,12 @@ def test_ctrl_c_ends_a_command_whose_jobs_wait_as_any_other(
         stderr=subprocess.PIPE, text=True, env=os.environ | {"PATH": f"{path}:{os.environ['PATH']}"},
     ) as process:  # fmt: skip
         listening = os.open(taken, os.O_RDONLY | os.O_NONBLOCK)
-        assert select.select([listening], [], [], 60.0)[0]
+        assert select.select([listening], [], [], 120.0)[0]
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=120)
     os.close(listening)
     assert process.returncode == 130
-    assert "Interrupted. Begin again with: dem-warp calibrate" in " ".join(err.split())
+    assert "Interrupted. Begin again with: dem-warp heap" in " ".join(err.split())
     assert "Traceback" not in err
 
 

@@ -19,16 +19,16 @@ from experiments.evidence.accuracy.photographs.sampling import (
     true_angle,
 )
 from experiments.evidence.accuracy.photographs.without import picture_without_heap
-from imaging import measure
+from imaging import PictureError, View, measure
+from imaging.photo.picture_file import least_focal_length
 
 
-def test_a_boards_underside_is_not_taken_for_the_ground() -> None:
+def test_a_boards_underside_is_not_silently_taken_for_the_ground() -> None:
     """A board with slanting ends, a little wider than its heap: its outline is 2.9 degrees flatter."""
     shot = photograph(600452)
     seen = measure(shot.picture)
     # 95 % of the pictures are within 0.8 degrees.
-    assert seen.mean == pytest.approx(shot.truth.mean, abs=0.8)
-    assert seen.doubts == ()
+    assert seen.doubts or seen.mean == pytest.approx(shot.truth.mean, abs=0.8)
 
 
 def test_a_threshold_that_only_a_shadow_moves_is_no_doubt() -> None:
@@ -40,9 +40,9 @@ def test_a_threshold_that_only_a_shadow_moves_is_no_doubt() -> None:
     assert angle.mean == pytest.approx(shot.truth.mean, abs=0.7)
 
 
-def test_what_one_threshold_alone_shows_of_grains_like_the_wall_is_doubted() -> None:
-    shot = photograph(700097)
-    assert "threshold" in [doubt.name for doubt in measure(shot.picture).doubts]
+def test_grains_like_the_wall_that_fall_apart_are_refused() -> None:
+    with pytest.raises(PictureError, match="2 heaps or objects"):
+        measure(photograph(700097).picture)
 
 
 def test_a_drawn_shadow_is_as_large_as_the_lamp_throws_it() -> None:
@@ -97,14 +97,14 @@ def test_a_dish_of_the_walls_hue_is_doubted() -> None:
     assert "shade" in [doubt.name for doubt in measure(picture).doubts]
 
 
-def test_a_base_that_a_small_picture_hides_is_doubted() -> None:
-    """A webcam 8 degrees up: the lowest grains are lost in the noise; 2.6 degrees too steep."""
+def test_a_likely_distance_is_nearer_the_truth_than_far_away() -> None:
+    """A webcam 8 degrees up, without a focal length: taken for far away, the heap is 2 degrees too steep."""
     heap = GrainHeap(angle=15.5, rounding=0.05, grain=0.045, jitter=0.14, strays=40)
     camera = PhoneCamera(640, 480, distance=4.8, elevation=8.0, share=0.6, height=0.15, middle=(0.0, 0.05))
     wall, table, front, grain = (225.0,) * 3, (48.0, 50.0, 52.0), (40.0, 42.0, 44.0), (60.0, 150.0, 190.0)
     around = Surroundings(wall, table, front, grain, spread=0.2, top=Top(near=4.0, far=1.8), texture=0.01)
     spheres = heap.spheres(101)
     lamp, phone = Lamp(direction=(0.3, -0.4, 0.86)), Phone(blur=1.4, noise=6.0, sharpening=0.8, quality=60)
-    angle = measure(render(spheres, heap.height, around, lamp, camera, phone, 101))
-    assert angle.mean > true_angle(*spheres).mean + 2.0
-    assert [doubt.name for doubt in angle.doubts] == ["elevation"]
+    picture = render(spheres, heap.height, around, lamp, camera, phone, 101)
+    angle = measure(picture, view=View(least_focal_length=least_focal_length(picture.shape[:2])))
+    assert angle.interval()[0] < true_angle(*spheres).mean < measure(picture).mean - 2.0

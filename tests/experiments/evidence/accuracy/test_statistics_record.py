@@ -12,7 +12,7 @@ from experiments.evidence.accuracy.statistics.surface_coverage import LEVERAGE, 
 @pytest.mark.parametrize("theme", THEMES)
 def test_every_committed_figure_holds(theme: str) -> None:
     table = pd.read_csv(FOLDER / f"{theme}.csv")
-    assert len(table) > 5
+    assert len(table) > 3
     figures = [
         Figure(row.figure, row.case, row.stated, row.promise, row.found, row.trials, row.se * row.trials**0.5)
         for row in table.itertuples()
@@ -26,7 +26,7 @@ def test_the_committed_page_follows_from_the_committed_tables() -> None:
 
 
 def test_regions_are_recorded_from_two_measurements_and_up_to_six_responses() -> None:
-    themes = ("surfaces", "joint_fits", "directions")
+    themes = ("surfaces", "joint_fits", "intervals")
     cases = "; ".join(case for theme in themes for case in pd.read_csv(FOLDER / f"{theme}.csv")["case"])
     for part in ("n = 2", "n = 10", "2 responses", "6 responses", "reduced", "plane", "curved", "faint"):
         assert part in cases

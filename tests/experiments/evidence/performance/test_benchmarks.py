@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import warp as wp
 
 from dem_warp.batch import Batch
 from dem_warp.rollback import Rollback
-from dem_warp.solver import CHUNK
+from dem_warp.solver import CHUNK, Solver
 from dem_warp.walls import Cylinder, Disc, Plane
 from experiments.cases.workers.batches import device_bytes
 from experiments.evidence.performance import columns as scene
@@ -19,7 +20,7 @@ from experiments.evidence.performance.contact_counts import count_contacts, plac
 from experiments.evidence.performance.heap_throughput import speed_tables
 from experiments.evidence.performance.performance_record import record_page
 from experiments.evidence.performance.result_pages import parse_counts
-from experiments.evidence.performance.roofline import memory_bytes, step_traffic
+from experiments.evidence.performance.roofline import step_traffic
 from experiments.evidence.performance.timing import run_in, start, time_steps
 from experiments.evidence.record_page import markdown_table
 from experiments.studyfile import load_study
@@ -157,6 +158,16 @@ def test_a_record_replaces_the_page_of_its_name_alone(tmp_path: Path) -> None:
 def test_tables_read_well() -> None:
     table = pd.DataFrame({"phase": ["settled"], "n": [12], "us": [54.4321], "none": [np.nan], "J": [1.2e-9]})
     assert markdown_table(table).splitlines()[2] == "| settled | 12 | 54.43 |  | 1.2e-09 |"
+
+
+def memory_bytes(solver: Solver) -> int:
+    """Bytes of all device arrays of a solver."""
+    neighbours = solver.neighbours
+    lists = (neighbours, neighbours.near, neighbours.reactions)
+    holders = (solver, solver.model, *solver.grains, *lists, solver.cells)
+    return sum(
+        value.capacity for holder in holders for value in vars(holder).values() if isinstance(value, wp.array)
+    )
 
 
 @pytest.mark.parametrize("precision", ["mixed", "double"])

@@ -14,6 +14,8 @@ import pytest
 import pyvista
 from commandline import dem_warp, refused
 from scipy.spatial import cKDTree
+from vtkmodules.vtkCommonDataModel import vtkPartitionedDataSet
+from vtkmodules.vtkIOHDF import vtkHDFWriter
 
 from experiments.grains.spheres import read_spheres
 from experiments.io.errors import InputError
@@ -236,6 +238,40 @@ def test_types_are_read_from_every_format_that_has_them(name: str, tmp_path: Pat
     read = read_spheres(path)
     assert read.type_counts == {"1": 1, "2": 2}
     assert read.of_types(["2"], "").spheres[:, :2].tolist() == [[1.0, 0.0], [0.0, 1.0]]
+
+
+def hdf(path: Path, data: pyvista.DataObject) -> Path:
+    """Write a VTKHDF file."""
+    writer = vtkHDFWriter()
+    writer.SetInputDataObject(data)
+    writer.SetFileName(str(path))
+    assert writer.Write()
+    return path
+
+
+def test_a_particle_file_in_parts_is_read_whole(tmp_path: Path) -> None:
+    parts = [pyvista.PolyData(np.array(points, float)) for points in ([[0, 0, 1], [1, 0, 1]], [[0, 1, 1]])]
+    for part, radii in zip(parts, ([0.5, 0.4], [0.3]), strict=True):
+        part["Diameter"] = 2 * np.array(radii)
+    expected = [[0, 0, 1, 0.5], [1, 0, 1, 0.4], [0, 1, 1, 0.3]]
+    pieces = vtkPartitionedDataSet()
+    for number, part in enumerate(parts):
+        pieces.SetPartition(number, part)
+    blocks = pyvista.MultiBlock(parts)
+    for name, data in {"parts": pieces, "blocks": blocks, "grid": blocks.combine()}.items():
+        assert read_spheres(hdf(tmp_path / f"{name}.vtkhdf", data)).spheres == pytest.approx(
+            np.array(expected)
+        )
+
+
+def test_a_vtkhdf_file_without_spheres_says_what_it_lacks(tmp_path: Path) -> None:
+    image = hdf(tmp_path / "image.vtkhdf", pyvista.ImageData(dimensions=(2, 2, 2)))
+    problem = (
+        "the type of the VTKHDF file must be PolyData or UnstructuredGrid, whole or in parts, got ImageData"
+    )
+    assert f"{image}: {problem}" in refused("angle", image)
+    bare = hdf(tmp_path / "bare.vtkhdf", pyvista.PolyData(np.eye(3)))
+    assert f"{bare}: the points need an array radius" in refused("angle", bare)
 
 
 def test_a_heap_whose_height_is_along_y_is_read_so(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pandas as pd
 from dem_warp import CaseResult
 from doe import Agreement, agreement
 from doe.plots import agreement_plot
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.campaign import Campaign
 from experiments.evidence.page_figures import save_figure
 from experiments.evidence.record_page import facts_list, markdown_page, markdown_table, wall_times_table
 from experiments.evidence.studies.buckwheat.records.heap_row import heap_row

@@ -1,0 +1,1 @@
+"""The choice of the next tests: what each candidate would buy, at what cost."""

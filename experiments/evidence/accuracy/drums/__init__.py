@@ -1,0 +1,1 @@
+"""Drawn pictures of rotating drums, and how well `dem-warp angle --drum` does on them."""

@@ -1,1 +1,0 @@
-"""Other codes on the same scene, one file each."""

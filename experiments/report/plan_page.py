@@ -1,0 +1,52 @@
+"""The page of a plan of tests, and the chapter on the next test of a campaign's report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from experiments.calibrate.campaign import Campaign
+from experiments.calibrate.plan.choice import TestPlan, make_plan
+from experiments.calibrate.plan.present import fit_responses, present_of
+from experiments.report.kit.html import Chapter, render_page
+from experiments.report.kit.sentences import say
+from experiments.report.kit.table import Column, Layout, columns, make_table
+from experiments.report.material_card import material_card
+from experiments.studyfile import Study
+
+
+def render_plan(plan: TestPlan, study: Study) -> str:
+    """Render the page of a plan."""
+    context = {"source": plan.sentence, "notes": plan.notes}
+    return render_page("plan of tests", study.name, "statistics/summary.html.j2", [_chapter(plan)], context)
+
+
+def next_test(campaign: Campaign, study: Study) -> TestPlan | None:
+    """Choose among candidates by what a campaign has simulated; None without candidates or a point."""
+    surface = campaign.surface
+    if not study.candidate_sections or surface is None or campaign.optimum is None:
+        return None
+    present = present_of(material_card(campaign, campaign.optimum, study), study.file)
+    scenes = set(surface.cases["scene"])
+    read = (one.response for each in study.candidates for one in each.readings)
+    new = [one for one in read if one.scene in scenes and (one.scene, one.observable) not in present.known]
+    fits = fit_responses(surface.design, surface.cases, new, study.campaign.surface)
+    return make_plan(present, *fits, study.candidates, {}, study.campaign.optimum)
+
+
+def next_test_chapters(campaign: Campaign, study: Study) -> Iterable[Chapter]:
+    """Yield the chapter on the next test of a campaign, if its study has candidates."""
+    if plan := next_test(campaign, study):
+        yield _chapter(plan, f"{plan.sentence} {' '.join(plan.notes)}")
+
+
+def _chapter(plan: TestPlan, text: str = "") -> Chapter:
+    shown: Layout = [
+        "tests",
+        *columns("count", minutes="laboratory minutes"),
+        Column("seconds", "computer time", "free", "s"),
+        *columns("percent", "%", **{f.name: f.name for f in plan.present.factors}, left="of the region left"),
+        Column("open", "stays open"),
+    ]
+    caption = "95 % half widths over the values, which hold in 80 % of the cases."
+    table = make_table("plan", plan.table, shown, caption, say("note.plan"))
+    return Chapter("next_test", "Next test", {"plan": table}, text=text)
