@@ -66,14 +66,17 @@ def test_workers_that_are_killed_lose_no_case_and_none_is_done_twice(
     client, take = two_workers._client, dask_workers._Session._take_message
     received: Counter[int] = Counter()
     begun: list[int] = []
+    processes: list[int] = []  # asked for before: a worker that has to answer first can end its batch meanwhile
 
     def kill(session: dask_workers._Session, message: dask_task.Message) -> None:
         """Take what a worker says; as the third batch has just begun, kill all workers."""
+        if message.reply and not begun:
+            processes.extend(client.run(os.getpid).values())
         take(session, message)
         if message.reply:
             begun.append(message.number)
             if len(begun) == 3:
-                for process in client.run(os.getpid).values():
+                for process in processes:
                     os.kill(process, signal.SIGKILL)
 
     def note(index: int, result: CaseResult) -> None:
@@ -81,7 +84,7 @@ def test_workers_that_are_killed_lose_no_case_and_none_is_done_twice(
 
     monkeypatch.setattr(dask_workers._Session, "_take_message", kill)
     results = two_workers.simulate(cases, None, note, None, tmp_path / "unfinished")
-    assert begun.count(begun[2]) > 1, "it was begun again"
+    assert max(Counter(begun).values()) > 1, "a batch was begun again"
     assert received == Counter(range(4))
     assert "a worker was lost" in caplog.text
     assert_same_bits(results, OwnWorkers("cpu", 1).simulate(cases))
