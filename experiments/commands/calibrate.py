@@ -59,18 +59,13 @@ def calibrate(
     advice = Attempt.of("calibrate", study, **options_of(prepared), live=live, budget=budget, json=as_json)
     with clear_errors(advice), live_page(prepared.folder, live, messages.print):
         from experiments.runs.calibration import run_calibration
-        from experiments.runs.request import AwaitingRuns
 
         print_study(prepared.study, prepared.resources)
         if fidelity := prepared.study.campaign.fidelity:
             messages.print(
                 f"The design at the scale {fidelity.scale}, {fidelity.runs} runs at the study's own."
             )
-        try:
-            ended = run_calibration(prepared, show_stage)
-        except AwaitingRuns as waiting:
-            messages.print(f"{waiting} {advice}")
-            return
+        ended = run_calibration(prepared, show_stage)
     if as_json:
         typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
     messages.print(f"{ended.campaign.outcome}: {ended.campaign.reason}")

@@ -25,6 +25,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 from rich.text import Text
 
 from experiments.io.time_left import duration, time_left
+from experiments.runs.request import AwaitingRuns
 
 if TYPE_CHECKING:
     from dem_warp import Progress as BatchProgress
@@ -135,6 +136,9 @@ def clear_errors(advice: object = "") -> Iterator[None]:
         except Terminated:
             messages.print(f"Ended by SIGTERM. {advice}")
             raise typer.Exit(TERMINATED) from None
+        except AwaitingRuns as waiting:
+            messages.print(f"{waiting} {advice}")
+            raise typer.Exit(0) from None
         except KeyboardInterrupt:
             messages.print(f"Interrupted. {advice}")
             raise typer.Exit(INTERRUPTED) from None

@@ -14,7 +14,7 @@ from experiments.commands.console import Attempt, clear_errors, messages, plain
 from experiments.commands.options import AsJson, DryRun, Live, options_of, with_request
 from experiments.commands.plans import show_plan
 from experiments.live.server import live_page
-from experiments.runs.request import AwaitingRuns, RunRequest
+from experiments.runs.request import RunRequest
 
 if TYPE_CHECKING:
     from experiments.runs.planning import TestPlan
@@ -45,11 +45,7 @@ def plan(
             show_plan(plan_tests(prepared.run, prepared.tables), as_json)
     advice = Attempt.of("plan", study, **options_of(prepared.run), after=after, live=live, json=as_json)
     with clear_errors(advice), live_page(prepared.run.folder, live, messages.print):
-        try:
-            found = run_plan(prepared)
-        except AwaitingRuns as waiting:
-            messages.print(f"{waiting} {advice}")
-            return
+        found = run_plan(prepared)
     if as_json:
         typer.echo(json.dumps(found.to_dict(), allow_nan=False))
     else:

@@ -175,7 +175,7 @@ def _measured_row(picture: Path, options: PictureOptions, copy: Path | None) -> 
         else:
             require_known(picture)
             require_no_text(picture)
-            angle = _angle_of(picture, options)
+            angle = angle_of(picture, options)
             row |= _values(angle)
             row["correction"] = angle.correction
             draw = partial(_drawn, picture, overlay, angle)
@@ -195,7 +195,7 @@ def _measured_row(picture: Path, options: PictureOptions, copy: Path | None) -> 
     return row
 
 
-def _angle_of(picture: Path, options: PictureOptions) -> ReposeAngle:
+def angle_of(picture: Path, options: PictureOptions) -> ReposeAngle:
     """Measure the angle of a heap; where a picture shows no heap but a drum, say so."""
     try:
         return measure_photograph(picture, options.fit, options.view)

@@ -2,32 +2,40 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from dem_warp import Case
 from doe import Factor
+from doe.discrepancy import Point
 from experiments.cases import Store
 from experiments.cases.execute import build_cases
+from experiments.cases.store.outcome_table import Outcome
 from experiments.export import EXPORTERS, ExportedTest, case_terms, export_input, write_export
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
 from experiments.io.rows import Row, read_rows
 from experiments.io.texts import is_number, number, safe_cell
-from experiments.measurement.photographs import PictureOptions, measure_pictures
+from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file
+from experiments.measurement.photographs import PictureOptions, angle_of, measure_pictures
 from experiments.runs.request import AwaitingRuns
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
-from experiments.studyfile.observables import ANGLE
+from experiments.studyfile.mechanism_factor import MechanismFactor
+from experiments.studyfile.observables import ANGLE, View
+from imaging import PictureError
 
 SHEETS, CASE, PICTURE, FAILED = "by-hand", "case", "picture", "failed"
 """Folder of the sheets; columns of a case's key and of its picture; word for a run that failed."""
-PLACES = (CASE, "stage", "test", "run", "repeat", "seed")
+PLACES = ("stage", "test", "run", "repeat", "seed")
 KEY = 12
 """Characters of a case's key."""
 CODES = ("edem", "rocky")
@@ -36,6 +44,35 @@ DIGITS = "%.10g"
 """Form of a setting."""
 LISTED = 6
 """Runs without result that a message lists."""
+SAID = "the sheet says that it failed"
+"""Reason of a run that failed."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A number that a person types in."""
+
+    observable: str
+    unit: str
+    pictured: bool
+    """A picture or the spheres of the heap can stand in its place."""
+
+    @property
+    def head(self) -> str:
+        """Its column."""
+        return f"{self.observable} [{self.unit}]"
+
+
+@dataclass(frozen=True)
+class AskedRun:
+    """A run that a person is asked for."""
+
+    key: str
+    places: Mapping[str, Any]
+    """Its stage, test and number by column."""
+    settings: Mapping[str, float]
+    """Values by column, which must stay."""
+    results: tuple[Result, ...]
 
 
 def typed_cases(study: Study, table: pd.DataFrame, folder: Path, title: str, store: Store) -> pd.DataFrame:
@@ -51,23 +88,11 @@ def typed_cases(study: Study, table: pd.DataFrame, folder: Path, title: str, sto
     """
     cases, refused = build_cases(study, table)
     keys = [store.key(case)[:KEY] if case else "" for case in cases]
-    responses = [_of_scene(study, scene) for scene in table["scene"]]
-    filled = {row[CASE]: row for path in _sheets(folder) for row in _rows(path, study)}
-    fresh = [place for place, key in enumerate(keys) if key and key not in filled]
-    if fresh:
-        path = folder / SHEETS / f"{len(_sheets(folder)) + 1:02d}-{re.sub('[^a-z]+', '-', title.lower())}.csv"
-        heads = {name: None for place in fresh for name in _heads(responses[place])}
-        rows = _blank_rows(study, table.iloc[fresh], [keys[place] for place in fresh])
-        _write_sheet(path, study, rows, list(heads))
-        _write_protocols(path.parent, study, cases)
-        raise AwaitingRuns(_waiting(path, len(fresh)))
-    _require_unchanged(study, table, keys, filled)
-    _require_filled(keys, filled, responses)
-    known = {
-        key: _result(filled[key], of, study.measurement.fit)
-        for key, of in zip(keys, responses, strict=True)
-        if key
-    }
+    asked = [_asked(study, key, row) for key, row in zip(keys, table.to_dict("records"), strict=True) if key]
+    every = tuple(_result_of(each) for each in study.target.responses)
+    first = next((case for case in cases if case), None)
+    filled = _Sheets(study, folder, title, every).take(asked, first)
+    known = {each.key: _result(filled[each.key], each.results, study.measurement.fit) for each in asked}
     lost = {"status": "refused", ANGLE: math.nan, "angle_se": math.nan}
     results = [
         known[key] if key else lost | {"reason": reason} for key, reason in zip(keys, refused, strict=True)
@@ -75,51 +100,109 @@ def typed_cases(study: Study, table: pd.DataFrame, folder: Path, title: str, sto
     return pd.concat([table, pd.DataFrame(results, index=table.index).assign(case_key=keys)], axis=1)
 
 
-def _of_scene(study: Study, scene: str) -> list[Response]:
-    return [each for each in study.target.responses if each.scene == scene]
+def typed_points(
+    study: Study,
+    library: Sequence[MechanismFactor],
+    observables: Sequence[str],
+    folder: Path,
+    title: str,
+    points: Mapping[str, Point],
+) -> dict[str, Outcome]:
+    """Return the observables of a search's points, by the keys of their cases, that a person typed in.
+
+    Mechanisms of the library that a point lacks are at their null. Raise as `typed_cases` does.
+    """
+    results = tuple(
+        Result(each.name, each.unit, each.by_photograph)
+        for each in study.measurable
+        if each.name in observables
+    )
+    heads = {each.name: f"{each.name} [{each.unit}]" for each in library}
+    nulls = {heads[each.name]: each.null for each in library}
+    asked = []
+    for run, (key, point) in enumerate(points.items(), start=1):
+        places = dict(zip(PLACES, (title, point.condition, run, 1, point.seed), strict=True))
+        settings = dict(zip(map(_head, study.factors), point.theta, strict=True))
+        settings |= nulls | {heads[name]: size for name, size in point.sizes}
+        asked.append(AskedRun(key[:KEY], places, settings, results))
+    words = [f"{each.name}: {each.title}. {each.sentence}" for each in library]
+    words += [f"test {each.name}: {json.dumps(each.changes)}" for each in study.conditions if each.changes]
+    filled = _Sheets(study, folder, title, results, tuple(words)).take(asked, study.case({}, 0))
+    return {key: _outcome(filled[key[:KEY]], results, study) for key in points}
 
 
-def _heads(responses: Sequence[Response]) -> Iterator[str]:
-    """Name the columns of results: a response with its unit, and a picture where it can show the response."""
-    for response in responses:
-        if response.weights or response.part_of:
-            problem = "is a profile, which nobody can type in"
-            raise InputError(f"response {response.name}", problem, hint="Give it as numbers of the heap.")
-        yield f"{response.observable} [{response.unit}]"
-        if response.observable == ANGLE:
-            yield PICTURE
+@dataclass(frozen=True)
+class _Sheets:
+    """Sheets of a run's folder."""
+
+    study: Study
+    folder: Path
+    title: str
+    """Batch that is asked for, which names a new sheet."""
+    results: tuple[Result, ...]
+    """Results that any of the sheets may have."""
+    words: tuple[str, ...] = ()
+    """Further comments of a new sheet."""
+
+    def take(self, asked: Sequence[AskedRun], case: Case[Any] | None) -> dict[str, Row]:
+        """Return the filled rows of runs by their keys; write a sheet of those that no sheet has, and wait.
+
+        With a new sheet come the values, the spheres and the protocol of a case.
+        """
+        settings = asked[0].settings if asked else {}
+        columns = [CASE, *PLACES, *settings, *_heads(self.results)]
+        sheets = sorted((self.folder / SHEETS).glob("*.csv"))
+        filled = {row[CASE]: row for path in sheets for row in read_rows(path, [CASE], columns)}
+        fresh = [run for run in asked if run.key not in filled]
+        if fresh and case:
+            name = re.sub("[^a-z]+", "-", self.title.lower())
+            path = self.folder / SHEETS / f"{len(sheets) + 1:02d}-{name}.csv"
+            codes = (f"{EXPORTERS[code].code}: {line}" for code in CODES for line in _names(self.study, code))
+            _write_sheet(path, fresh, [*codes, *self.words])
+            _write_protocols(path.parent, self.study, case)
+            raise AwaitingRuns(_waiting(path, len(fresh)))
+        for run in asked:
+            _require_unchanged(run, filled[run.key])
+        _require_filled(asked, filled)
+        return filled
 
 
-def _sheets(folder: Path) -> list[Path]:
-    return sorted((folder / SHEETS).glob("*.csv"))
+def _asked(study: Study, key: str, row: Mapping[str, Any]) -> AskedRun:
+    """Ask for a case of a campaign: the responses of its test."""
+    places = (row["stage"], row["scene"], row["run"], row["replicate"], row["seed"])
+    settings = {_head(factor): float(row[factor.name]) for factor in study.factors}
+    results = tuple(_result_of(each) for each in study.target.responses if each.scene == row["scene"])
+    return AskedRun(key, dict(zip(PLACES, places, strict=True)), settings, results)
 
 
-def _rows(path: Path, study: Study) -> Iterator[Row]:
-    results = [head for response in study.target.responses for head in _heads([response])]
-    known = [*PLACES, *(_head(factor) for factor in study.factors), *results]
-    return read_rows(path, [CASE], known)
+def _result_of(response: Response) -> Result:
+    if response.weights or response.part_of:
+        problem = "is a profile, which nobody can type in"
+        raise InputError(f"response {response.name}", problem, hint="Give it as numbers of the heap.")
+    return Result(response.observable, response.unit, response.observable == ANGLE)
+
+
+def _heads(results: Sequence[Result]) -> Iterator[str]:
+    """Name the columns of results, and one of pictures where they can show a result."""
+    yield from (result.head for result in results)
+    if any(result.pictured for result in results):
+        yield PICTURE
 
 
 def _head(factor: Factor) -> str:
     return f"{factor.name} [{factor.unit or '1'}]"
 
 
-def _blank_rows(study: Study, table: pd.DataFrame, keys: Sequence[str]) -> list[dict[str, Any]]:
-    """Lay out the settings of each case."""
-    rows = []
-    for key, row in zip(keys, table.to_dict("records"), strict=True):
-        place = (key, row["stage"], row["scene"], row["run"], row["replicate"], row["seed"])
-        rows.append(dict(zip(PLACES, place, strict=True)) | {_head(f): row[f.name] for f in study.factors})
-    return rows
-
-
-def _write_sheet(path: Path, study: Study, rows: Sequence[Mapping[str, Any]], results: list[str]) -> None:
-    """Write a sheet: comments with other codes' names of the values, then a row for each run."""
-    frame = pd.DataFrame(rows).assign(**dict.fromkeys(results, "")).map(safe_cell)
-    words = [f"Fill in the last columns; write {FAILED} for a run that failed. Change nothing else."]
-    words += [f"{EXPORTERS[code].code}: {line}" for code in CODES for line in _names(study, code)]
-    comments = "".join(f"# {word.replace(',', ';')}\n" for word in words)
+def _write_sheet(path: Path, runs: Sequence[AskedRun], words: Sequence[str]) -> None:
+    """Write a sheet: comments, then a row for each run."""
+    rows = [
+        {CASE: run.key, **run.places, **run.settings, **dict.fromkeys(_heads(run.results), "")}
+        for run in runs
+    ]
+    first = f"Fill in the last columns; write {FAILED} for a run that failed. Change nothing else."
+    comments = "".join(f"# {word.replace(',', ';')}\n" for word in (first, *words))
     path.parent.mkdir(parents=True, exist_ok=True)
+    frame = pd.DataFrame(rows).map(safe_cell)
     write_text(path, comments + frame.to_csv(index=False, float_format=DIGITS, lineterminator="\n"))
 
 
@@ -133,9 +216,8 @@ def _names(study: Study, code: str) -> Iterator[str]:
             yield f"{factor.name} = {' and '.join(terms)}"
 
 
-def _write_protocols(folder: Path, study: Study, cases: Sequence[Case[Any] | None]) -> None:
-    """Write values, spheres and protocol of the first case for codes with dialogs, where they can have it."""
-    case = next(case for case in cases if case)
+def _write_protocols(folder: Path, study: Study, case: Case[Any]) -> None:
+    """Write values, spheres and protocol of a case for codes with dialogs, where they can have it."""
     for code in CODES:
         try:
             test = ExportedTest(study.name, case, study.file.name)
@@ -148,55 +230,66 @@ def _waiting(path: Path, count: int) -> str:
     return f"Simulate the {count} runs of {path}, fill in its last columns, and resume."
 
 
-def _require_unchanged(
-    study: Study, table: pd.DataFrame, keys: Sequence[str], filled: Mapping[str, Row]
-) -> None:
+def _require_unchanged(run: AskedRun, row: Row) -> None:
     """Refuse a setting that is not the one that was asked for."""
-    for key, asked in zip(keys, table.to_dict("records"), strict=True):
-        for factor in study.factors if key else ():
-            head, wanted = _head(factor), float(asked[factor.name])
-            text = filled[key][head]
-            if not is_number(text) or not math.isclose(number(text), wanted, rel_tol=1e-6, abs_tol=1e-12):
-                raise filled[key].error(f"must stay as the campaign wrote it, {wanted!r}", head)
+    for head, wanted in run.settings.items():
+        text = row[head]
+        if not is_number(text) or not math.isclose(number(text), wanted, rel_tol=1e-6, abs_tol=1e-12):
+            raise row.error(f"must stay as the campaign wrote it, {wanted!r}", head)
 
 
-def _require_filled(
-    keys: Sequence[str], filled: Mapping[str, Row], responses: Sequence[Sequence[Response]]
-) -> None:
+def _require_filled(asked: Sequence[AskedRun], filled: Mapping[str, Row]) -> None:
     """Refuse a sheet of which some runs have no result; one without any result waits."""
-    pairs = [(filled[key], of) for key, of in zip(keys, responses, strict=True) if key]
-    empty = [row for row, of in pairs if not _is_filled(row, of)]
+    empty = [filled[run.key] for run in asked if not _is_filled(filled[run.key], run.results)]
     if not empty:
         return
     path = empty[0].file
-    if len(empty) == sum(row.file == path for row, _ in pairs):
+    if len(empty) == sum(filled[run.key].file == path for run in asked):
         raise AwaitingRuns(_waiting(path, len(empty)))
     lines = ", ".join(f"{row['run']} repeat {row['repeat']} (line {row.line})" for row in empty[:LISTED])
     more = f" and {len(empty) - LISTED} more" if len(empty) > LISTED else ""
     raise InputError(str(path), f"has no result yet for run {lines}{more}")
 
 
-def _is_filled(row: Row, responses: Sequence[Response]) -> bool:
-    cells = [row[head] for head in _heads(responses)]
+def _failed(row: Row, results: Sequence[Result]) -> bool:
+    return FAILED in [row[head] for head in _heads(results)]
+
+
+def _is_filled(row: Row, results: Sequence[Result]) -> bool:
     shown = bool(row[PICTURE])
-    needed = [r for r in responses if not (shown and r.observable == ANGLE)]
-    return FAILED in cells or all(row[next(_heads([each]))] for each in needed)
+    return _failed(row, results) or all(row[each.head] for each in results if not (shown and each.pictured))
 
 
-def _result(row: Row, responses: Sequence[Response], fit: str) -> dict[str, Any]:
-    """Read the results of a run."""
+def _value(row: Row, head: str) -> float:
+    if not is_number(row[head]):
+        raise row.error("must be a number", head)
+    return number(row[head])
+
+
+def _result(row: Row, results: Sequence[Result], fit: str) -> dict[str, Any]:
+    """Read the results of a campaign's run."""
     result: dict[str, Any] = {"status": "finished", "reason": "", ANGLE: math.nan, "angle_se": math.nan}
-    if FAILED in [row[head] for head in _heads(responses)]:
-        return result | {"status": "failed", "reason": "the sheet says that it failed"}
-    for response in responses:
-        head = next(_heads([response]))
-        if response.observable == ANGLE and not row[head]:
+    if _failed(row, results):
+        return result | {"status": "failed", "reason": SAID}
+    for each in results:
+        if each.pictured and not row[each.head]:
             result |= _pictured(row, fit)
-            continue
-        if not is_number(row[head]):
-            raise row.error("must be a number", head)
-        result[response.observable] = number(row[head])
+        else:
+            result[each.observable] = _value(row, each.head)
     return result
+
+
+def _outcome(row: Row, results: Sequence[Result], study: Study) -> Outcome:
+    """Read the observables of a search's run; what is not typed in is measured on its picture."""
+    if _failed(row, results):
+        return np.full(len(results), math.nan), SAID
+    shown = _shown(row, study) if row[PICTURE] else {}
+    typed = {
+        each.observable: _value(row, each.head)
+        for each in results
+        if row[each.head] or each.observable not in shown
+    }
+    return np.array([(shown | typed)[each.observable] for each in results]), ""
 
 
 def _pictured(row: Row, fit: str) -> dict[str, Any]:
@@ -205,3 +298,18 @@ def _pictured(row: Row, fit: str) -> dict[str, Any]:
     if measured["mean"] is None:
         raise row.error(f"shows no angle: {measured['reason']}", PICTURE)
     return {ANGLE: measured["mean"], "angle_se": measured["se"]}
+
+
+def _shown(row: Row, study: Study) -> dict[str, float]:
+    """Measure what a row's spheres show of the heap, or its picture, which shows no lengths."""
+    path, fit = row.file.parent / row[PICTURE], study.measurement.fit
+    shown = [each for each in study.measurable if each.by_photograph]
+    try:
+        if is_heap_file(path):
+            heap = measure_heap_file(path, fit, HeapSettings()).angle
+            views = [View.of(view) for view in heap.views]
+            return {each.name: each.in_heap(heap, views) for each in shown}
+        views = [View.of(angle_of(path, PictureOptions(fit)))]
+    except PictureError as error:
+        raise row.error(f"shows no angle: {error}", PICTURE) from None
+    return {each.name: each.in_pictures(views) for each in shown if each.unit != "m"}

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from experiments.report.study_companion import companion_of
 from experiments.runs.choices import Prepared
 from experiments.runs.run_folder import BANK, OUTCOMES, Run, open_run
 from experiments.studyfile import Study
+from experiments.studyfile.mechanism_factor import MechanismFactor
 from experiments.studyfile.observables import Instrument
 
 SETTINGS = "settings.json"
@@ -74,13 +76,19 @@ class SearchResult:
 class _ShownSimulator:
     """The engine of an open run: each of its batches is shown, and noted with its wall time."""
 
-    def __init__(self, run: Run, engine: EngineSimulator) -> None:
+    def __init__(self, run: Run, engine: EngineSimulator, library: Sequence[MechanismFactor]) -> None:
         self.observables = engine.observables
         self.title = "bank"
-        self._run, self._engine = run, engine
+        self._run, self._engine, self._library = run, engine, library
 
     def __call__(self, points: Sequence[Point]) -> Outcomes:
-        """Return the observables of every point."""
+        """Return the observables of every point; raise `AwaitingRuns` where a person simulates them."""
+        if self._run.is_by_hand:
+            # few searches are; what reads their sheets takes a second to load
+            from experiments.runs.by_hand import typed_points
+
+            given = (self._run.study, self._library, self.observables, self._run.folder, self.title)
+            return self._engine(points, person=partial(typed_points, *given))
         with self._run.batch(self.title, lambda: len(self._engine.table)) as progress:
             return self._engine(points, progress)
 
@@ -99,7 +107,7 @@ def run_search(prepared: Prepared, given: SearchData) -> SearchResult:
         open_run("discover", prepared, "bank" if measured is None else "discover") as run,
         EngineSimulator(study, search.library, OutcomeTable(run.folder / OUTCOMES), run.workers) as engine,
     ):
-        simulator = _ShownSimulator(run, engine)
+        simulator = _ShownSimulator(run, engine, search.library)
         if bank is None:
             bank = search.make_bank(simulator, maker_of_today(source_commit(), engine.engine))
             with replacing(run.folder / BANK) as temporary:
@@ -116,7 +124,9 @@ def run_search(prepared: Prepared, given: SearchData) -> SearchResult:
         simulator.title, started = "fresh runs", time.perf_counter()
         found = drive(search.analysis(measured, bank, given.seed), simulator)
         provenance = _provenance(run, given, bank) | {"seconds": round(time.perf_counter() - started, 1)}
-        pictures, solid = heaps_side_by_side(engine, found, terms, measured, given.seed)
+        pictures, solid = (
+            ([], None) if run.is_by_hand else heaps_side_by_side(engine, found, terms, measured, given.seed)
+        )
         further = companion.discovery_chapters(found, terms, given.measured)
         with run.publishing(**made_from) as drafts:
             search.settings.write(drafts / SETTINGS)

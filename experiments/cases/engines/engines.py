@@ -35,15 +35,16 @@ ENGINES: Registry[Engine] = Registry("dem_warp.engines", _DRIVERS, _check)
 
 @dataclass(frozen=True)
 class _Person:
-    """A person who simulates cases in another program: a campaign writes sheets of them."""
+    """A person who simulates cases in another program: campaigns and searches write sheets of them."""
 
+    observables: tuple[str, ...] = ()
+    """Observables that the sheets of a search ask for, next to those that heaps show."""
     identity: str = "by hand"
 
     def __call__(self, cases: Sequence[Case], *others: Any, **options: Any) -> list[CaseResult]:
-        raise InputError("engine.by", "a person simulates this study's cases; only calibrate waits for them")
-
-
-BY_HAND = _Person()
+        raise InputError(
+            "engine.by", "a person simulates this study's cases; only calibrate and discover wait for them"
+        )
 
 
 def with_engine(study: Study, name: str | None = None, command: str | None = None, **limits: Any) -> Study:
@@ -82,11 +83,12 @@ def engine_of(study: Study) -> Engine | None:
     if section is None:
         solver.check_solver(OWN_SOLVER, solver_place)
         return None
-    if section.by is not None:
-        return BY_HAND
-    if section.command is not None:
+    if section.name is None:
         declared = dict.fromkeys(name for scene in study.scenes.values() for name in scene.observables)
         _check_observables(section.observables, list(declared), f"{place}.observables")
+    if section.by is not None:
+        return _Person(section.observables)
+    if section.command is not None:
         more = (section.version, section.observables)
         command = command_program(section.command, study.file.parent, f"{place}.command", *more)
         solver.check_solver(command.name, solver_place)

@@ -9,13 +9,19 @@ import pandas as pd
 import pytest
 from commandline import dem_warp
 from cone_engine import cone_of
+from emulated import EmulatedSimulator, emulated_heaps
 
 from doe import Design, Factor, fit_surface
+from doe.discrepancy import Point, fit_emulator, load_bank
 from experiments.io.rows import Row
 from experiments.runs import by_hand
 from experiments.studies.buckwheat.paper import published
+from experiments.studyfile.observables import BY_NAME, PHOTOGRAPHED
 
 STUDY = Path(__file__).parents[3] / "experiments" / "studies" / "buckwheat"
+TRIAL = STUDY.with_name("trial")
+MECHANISMS = {"plate_tilt": "plate_tilt [deg]", "rolling_torque": "rolling_torque [1]"}
+"""Mechanisms of the search, and their columns in its sheets."""
 PRINTED = "repose_angle_deg"
 PAPER = {
     "# start = ": "start = ", "# step = ": "step = ", "# drop = ": "drop = ",
@@ -136,7 +142,69 @@ def test_the_spheres_of_a_run_are_measured_as_the_study_measures(fit: str, tmp_p
     assert found["angle"] == json.loads(out)["pictures"][0]["mean"]
 
 
-def test_only_a_campaign_waits_for_a_person(study: Path) -> None:
+def search(*words: str) -> tuple[int, str]:
+    code, _, said = dem_warp(
+        "discover", "study.toml", "measured.csv", "--scale", "bench", "--out", "found", *words
+    )
+    return code, said
+
+
+def test_a_search_names_a_hidden_tilt_from_runs_that_a_person_typed_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The person's program is an emulator of the shipped bank; every batch waits with exit code 0."""
+    monkeypatch.chdir(tmp_path)
+    text = (TRIAL / "study.toml").read_text(encoding="utf-8").replace('companion = "trial"', "")
+    few = text.replace('"contact_adhesion", "liquid_bridges", "plate_tilt",', '"plate_tilt",')
+    few = few.replace(', "size_spread", "vibration"]', "]").replace("outline = true", "outline = false")
+    Path("study.toml").write_text(few + '\n[engine]\nby = "hand"\n', encoding="utf-8")
+    shutil.copy(TRIAL / "clump.txt", "clump.txt")
+    person = EmulatedSimulator(fit_emulator(load_bank(TRIAL / "bank-bench.npz")))
+    heaps = emulated_heaps(person, (0.6, 0.5, 0.3), {"plate_tilt": 5.0}, replicates=20, seed=1)
+    cells = [
+        (condition, replicate, name, value, BY_NAME[name].unit)
+        for condition, table in dict(heaps.values).items()
+        for replicate, row in enumerate(table, start=1)
+        for name, value in zip(heaps.observables, row, strict=True)
+        if name in PHOTOGRAPHED
+    ]
+    columns = ["condition", "replicate", "observable", "value", "unit"]
+    pd.DataFrame(cells, columns=columns).to_csv("measured.csv", index=False)
+    code, said = search()
+    for _ in range(12):
+        assert code == 0, said
+        if Path("found/report.html").is_file():
+            break
+        assert "fill in its last columns, and resume" in said
+        answer(max(Path("found/by-hand").glob("*.csv")), person)
+        code, said = search("--resume")
+    found = json.loads(Path("found/results.json").read_text(encoding="utf-8"))["discovery"]
+    assert (found["verdict"], found["named"]) == ("named", ["plate_tilt"])
+
+
+def answer(sheet: Path, person: EmulatedSimulator) -> None:
+    """Type in what a program would give for the runs of a sheet."""
+    head = "".join(
+        line for line in sheet.read_text(encoding="utf-8").splitlines(True) if line.startswith("#")
+    )
+    runs = pd.read_csv(sheet, comment="#")
+    points = [
+        Point(
+            (row["mu_gg [1]"], row["mu_gw [1]"], row["e_gg [1]"]),
+            tuple((name, row[column]) for name, column in MECHANISMS.items() if row[column]),
+            row["test"],
+            int(row["seed"]),
+        )
+        for row in runs.to_dict("records")
+    ]
+    values = pd.DataFrame(person(points).values, columns=list(person.observables))
+    typed = [column for column in runs if column.split(" ")[0] in person.observables]
+    assert typed
+    runs[typed] = values[[column.split(" ")[0] for column in typed]]
+    sheet.write_text(head + runs.to_csv(index=False), encoding="utf-8")
+
+
+def test_only_campaigns_and_searches_wait_for_a_person(study: Path) -> None:
     code, _, said = dem_warp("heap", study, "--scale", "bench", "--engine", "hand", "--out", "one")
     assert code == 2
-    assert "only calibrate waits" in said
+    assert "only calibrate and discover wait" in said

@@ -66,7 +66,9 @@ def test_workers_that_are_killed_lose_no_case_and_none_is_done_twice(
     client, take = two_workers._client, dask_workers._Session._take_message
     received: Counter[int] = Counter()
     begun: list[int] = []
-    processes: list[int] = []  # asked for before: a worker that has to answer first can end its batch meanwhile
+    processes: list[
+        int
+    ] = []  # asked for before: a worker that has to answer first can end its batch meanwhile
 
     def kill(session: dask_workers._Session, message: dask_task.Message) -> None:
         """Take what a worker says; as the third batch has just begun, kill all workers."""
