@@ -24,7 +24,7 @@ class EngineSection(Section):
     version: str = ""
     """Version of the program, in any words: results of another one are stored apart."""
     observables: tuple[str, ...] = ()
-    """Observables of the test that the program or person reports with the heap; a search must know them first."""
+    """Observables of the test that the program or person reports with the heap; a search must have them."""
     workers: int | None = Field(default=None, ge=1)
     """Cases at once. Default: one a core."""
     time_limit: Time | None = Field(default=None, gt=0.0)
