@@ -251,7 +251,7 @@ def test_an_import_loads_no_more_than_it_needs(unwanted: dict[str, set[str]]) ->
 
 
 def test_no_generic_room_knows_a_study() -> None:
-    named = re.compile(r"studies\.(buckwheat|cellulose|trial|wheat_drums)")
+    named = re.compile(r"studies\.(buckwheat|cellulose|trial|wheat)")
     rooms = [
         s
         for s in sources("experiments")

@@ -294,8 +294,10 @@ class Physics(Section):
         return case
 
     def wall_parts(self) -> tuple[WallPart, ...]:
-        """Build the engine's parts of the walls, in the order of their names."""
-        parts = sorted(self.walls.items())
+        """Build the engine's parts of the walls that the test has, in the order of their names."""
+        scene = self.scene.scene(self.wall.material())
+        own = {name for names in getattr(scene, "part_names", ()) for name in names} or {*self.walls}
+        parts = sorted((name, part) for name, part in self.walls.items() if name in own)
         return tuple(part.part(name, self.wall, self.contact.grain_wall) for name, part in parts)
 
 

@@ -95,6 +95,12 @@ def test_a_case_of_a_further_scene_has_the_same_grains_and_contacts(write_study:
         study.case({}, seed=1, scene="bim")
 
 
+def test_a_further_scene_has_only_the_parts_of_walls_that_it_has(write_study: WriteStudy) -> None:
+    study = load_study(write_study(add=RESPONSES + "[walls.plate]\nstatic_friction = 0.1\n"))
+    parts = {scene: [part.name for part in study.case({}, 1, scene).wall_parts] for scene in study.scenes}
+    assert parts == {"target": ["plate"], "bin": [], "short": ["plate"]}
+
+
 @pytest.mark.parametrize("scale", [None, "bench"])
 def test_the_study_from_a_curve_to_a_point_hides_the_same_truth_at_every_scale(scale: str | None) -> None:
     study = load_study(BUCKWHEAT.with_name("curve_to_point.toml"), scale)

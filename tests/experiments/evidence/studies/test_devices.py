@@ -11,7 +11,7 @@ ABSENT = "cuda:99"
 
 SCRIPTS = [
     ("experiments.evidence.studies.cellulose.__main__", ["run", "--scale", "bench"]),
-    ("experiments.evidence.studies.wheat_drums.__main__", ["run", "--scale", "bench"]),
+    ("experiments.evidence.studies.wheat.__main__", ["run", "--scale", "bench"]),
     ("experiments.evidence.verification.__main__", []),
 ]
 
