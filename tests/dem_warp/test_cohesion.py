@@ -18,7 +18,7 @@ from dem_warp.laws.jkr import JKR
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.laws.wall_adhesion import WallAdhesion
-from dem_warp.model import ContactCoefficients, WorldSetup
+from dem_warp.model import ContactCoefficients
 from dem_warp.walls import Plane
 
 MODULUS = pair().modulus
@@ -239,28 +239,3 @@ def test_jkr_takes_the_work_of_separation_from_an_impact():
     # Both balls feel the same, in every step: rounding of 6000 of them.
     momenta = seen.velocities[:, ::2, 2] + seen.velocities[:, 1::2, 2]
     np.testing.assert_allclose(momenta, np.broadcast_to(speeds, momenta.shape), rtol=1e-12)
-
-
-DAMP = (
-    CapillaryBridge(surface_tension=0.072, bridge_volume=8e-12),
-    JKR(work_of_adhesion=0.1),
-    LinearCohesion(cohesion_energy_density=1e4),
-)
-
-
-def damp_pile(skin: float, seed: int = 1) -> WorldSetup:
-    """Return nine-sphere grains that fall and stick; their bridges reach 0.2 mm."""
-    contact = pair(restitution=0.3, friction=0.5, rolling=0.05, mechanisms=only(*DAMP))
-    return replace(worlds.pile(seed, 16, skin), contacts=(contact, contact))
-
-
-def test_bonds_outlast_rebuilds_in_any_batch():
-    seldom = solve(damp_pile(2e-3), precision="mixed")
-    often = solve(damp_pile(2e-3, seed=2), damp_pile(1e-4), precision="mixed")
-    often.cycle_limit = 2
-    for solver in (seldom, often):
-        run_for(solver, 0.05)
-        assert not solver.flags.numpy().any()
-    # The thin skin is used up again and again (measured: 39 and 805 rebuilds).
-    assert often.rebuilds.numpy()[1] > 10 * seldom.rebuilds.numpy()[0]
-    worlds.assert_same_bits(state(often, 1), state(seldom))

@@ -36,7 +36,7 @@ def cases() -> dict[str, Case]:
 
 @pytest.fixture(scope="module")
 def runs() -> dict[str, CaseResult]:
-    return dict(zip(cases(), simulate(list(cases().values()), device="cpu"), strict=True))
+    return dict(zip(cases(), simulate(list(cases().values()), device="cpu", workers=1), strict=True))
 
 
 @pytest.mark.parametrize("name", [name for name in cases() if name != "soft"])

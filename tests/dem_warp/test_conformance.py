@@ -50,8 +50,8 @@ CASES = {
     "shear": ball_case(Shear(0.024, 0.016, STEEL, 1e3, speed=0.1, rest_speed=5e-3), 0.4),
     "penetration": ball_case(Penetration(0.03, 0.02, STEEL, 0.01, 0.01, rest_speed=3e-3), 0.4, 0.1),
     "draw-down": ball_case(DrawDown(0.04, 0.009, 0.015, 0.016, 0.025, STEEL, rest_speed=3e-3), 0.3, 0.1),
-    "drop": small_case(scene=Drop(0.02, STEEL, grain_count=6, plate_angle=0.5)),
-    "incline": small_case(scene=Incline(STEEL, grain_count=3, sledge=3, rotation_rate=60 / 360)),
+    "drop": ball_case(Drop(0.02, STEEL, grain_count=6, plate_angle=0.5), 0.4, 0.05),
+    "incline": ball_case(Incline(STEEL, grain_count=3, sledge=3, rotation_rate=60 / 360), 0.4, 0.05),
     "roll": ball_case(Roll(0.5, 0.02, STEEL, grain_count=4, run=0.2), 0.5, 0.1),
 }
 names = {"ids": lambda one: getattr(one, "name", None) or one.__name__}

@@ -169,7 +169,7 @@ def test_coulomb_s_limit_holds_for_the_spring_for_both_or_for_their_sum():
 def test_friction_follows_the_size_of_a_force_that_attracts():
     ends = {}
     for load in ("push", "size"):
-        laws = ContactLaws(friction_load=load)
+        laws = worlds.along(friction_load=load)
         contact = pair(restitution=0.05, friction=0.3, laws=laws)
         step = Impact.of(contact, RADIUS, ball_mass(), SPEED).duration / 400.0
         bodies = grains([0.0, 0.0, RADIUS], velocities=[10.0 * SPEED, 0.0, -SPEED])
@@ -184,7 +184,7 @@ def test_friction_follows_the_size_of_a_force_that_attracts():
 
 
 def oblique(history: str) -> tuple[Any, float, Record]:
-    laws = ContactLaws(tangential_history=history, tangential_damping="none")
+    laws = replace(worlds.along(tangential_history=history), tangential_damping="none")
     contact = pair(friction=1e6, laws=laws)
     step = Impact.of(contact, RADIUS, ball_mass(), SPEED).duration / 200.0
     bodies = grains([0.0, 0.0, RADIUS], velocities=[0.5 * SPEED, 0.0, -SPEED])

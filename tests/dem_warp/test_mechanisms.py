@@ -39,7 +39,7 @@ EVERY_LAW = (
     KineticFriction(friction_drop=0.2),
     HystereticSpring(plasticity=0.3),
     MicroSlip(micro_slip=1.0),
-    CapillaryBridge(),
+    CapillaryBridge(surface_tension=0.072, bridge_volume=8e-12),
 )
 
 
@@ -49,9 +49,10 @@ def only(*laws: Mechanism) -> tuple[Mechanism, ...]:
     return tuple(given.get(kind, kind()) for kind in KINDS)
 
 
-def rich_pile(skin: float = 1e-3) -> WorldSetup:
+def rich_pile(skin: float = 1e-3, seed: int = 1) -> WorldSetup:
+    """Return nine-sphere grains that fall and stick; their bridges reach 0.2 mm."""
     contact = pair(restitution=0.3, friction=0.5, rolling=0.1, mechanisms=EVERY_LAW)
-    return replace(pile(count=GRAINS, skin=skin), contacts=(contact, contact))
+    return replace(pile(seed, GRAINS, skin), contacts=(contact, contact))
 
 
 FALL = 0.05
@@ -60,18 +61,19 @@ FALL = 0.05
 GRAINS = 12
 
 
-def test_a_pile_with_all_mechanisms_comes_to_rest_and_its_contacts_survive_rebuilds():
+def test_a_pile_with_all_mechanisms_comes_to_rest_and_its_contacts_outlast_rebuilds_in_any_batch():
     solver = solve(rich_pile(), precision="mixed")
     run_for(solver, FALL)
     midst = state(solver)
     assert np.abs(midst["velocities"]).max() > 0.02
-    often = solve(rich_pile(skin=3e-4), precision="mixed")
+    often = solve(rich_pile(seed=2), rich_pile(skin=3e-4), precision="mixed")
     often.cycle_limit = 2
     run_for(often, FALL)
-    assert often.rebuilds.numpy()[0] > 100
-    worlds.assert_same_bits(state(often), midst)
+    assert often.rebuilds.numpy()[1] > 100
+    worlds.assert_same_bits(state(often, 1), midst)
     run_for(solver, 0.2)
-    assert solver.flags.numpy()[0] == often.flags.numpy()[0] == 0
+    assert not solver.flags.numpy().any()
+    assert not often.flags.numpy().any()
     end = state(solver)
     assert len(end["slots"]) == GRAINS
     # Fixed-point positions let a resting grain tremble by a count, 1e-10 m, in some steps.

@@ -19,7 +19,7 @@ INERTIA = 0.4 * ball_mass() * RADIUS**2
 
 
 def rolling(choice: str, **numbers: float) -> ContactLaws:
-    return ContactLaws(rolling=choice, **numbers)
+    return ContactLaws(rolling=choice, **worlds.ALONG.get(choice, {}), **numbers)
 
 
 def spun(

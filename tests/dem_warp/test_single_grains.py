@@ -31,7 +31,7 @@ SLIDING = 1.55
 with the restitution e' = 0.55 that e = 0.5 has where damping may not attract (verification, restitution)."""
 
 BALL_RADIUS = 2e-3
-DUMBBELL = ClumpShape.from_spheres([[-3e-3, 0.0, 0.0], [3e-3, 0.0, 0.0]], [2e-3, 2e-3])
+DUMBBELL = ClumpShape.from_spheres([[x, 0.0, 0.0] for x in (-3e-3, 0.0, 3e-3)], [2e-3] * 3)
 
 
 def fine(scene: object, friction: float = 0.3, rolling: float = 0.0) -> Case:
@@ -59,7 +59,7 @@ PLATE = Incline(STEEL, grain_count=3, rotation_rate=SLOW)
 INCLINES = {
     "slide": ball_case(PLATE, 0.3, 1.0),
     "roll": ball_case(PLATE, 0.9, 0.2),
-    "sledge": of_shape(ball_case(replace(PLATE, sledge=3), 0.3), PYRAMID, 0.5),
+    "sledge": ball_case(replace(PLATE, sledge=3), 0.3, 0.05),
     "rough": ball_case(replace(PLATE, plate="grains", rotation_rate=20 / 360), 0.3, 0.05),
 }
 SLOPE, WAY, ROLLING = math.radians(30.0), 0.05, 0.05
@@ -69,7 +69,7 @@ CASES = DROPS | INCLINES | ROLLS
 
 @pytest.fixture(scope="module")
 def runs() -> dict[str, CaseResult]:
-    return dict(zip(CASES, simulate(list(CASES.values()), device="cpu"), strict=True))
+    return dict(zip(CASES, simulate(list(CASES.values()), device="cpu", workers=1), strict=True))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -125,15 +125,15 @@ def test_a_dumbbell_that_hits_with_one_end_rebounds_as_a_rigid_body():
     up = 2 * (x * z - w * y)
     lever = 3e-3 * np.sqrt(1 - up**2)
     wanted = 1.8 / (1 + lever**2 / DUMBBELL.inertia_over_mass.max()) - 1
-    # that steep, the other end has not come down yet; 3 %: the end gives way while the grain turns
+    # that steep, the other end has not come down yet; 4 %: the end gives way while the grain turns
     steep = np.abs(up) > 0.8
     assert np.count_nonzero(steep) > 5
-    assert seen[steep] == pytest.approx(wanted[steep], abs=0.03)
+    assert seen[steep] == pytest.approx(wanted[steep], abs=0.04)
 
 
 def test_copies_never_meet():
     scene = Drop(0.05, STEEL, grain_count=49, plate_angle=math.pi / 4)
-    case = of_shape(ball_case(scene, 0.5), PYRAMID, 0.95)
+    case = of_shape(ball_case(scene, 0.5), DUMBBELL, 0.95)
     nearest = []
     batch = Batch([case], "cpu")
     while batch.running:
@@ -141,7 +141,7 @@ def test_copies_never_meet():
         apart = np.linalg.norm(places[:, None] - places[None], axis=2)
         nearest.append(apart[np.triu_indices(len(places), 1)].min(initial=1.0))
         batch.advance()
-    assert min(nearest) > 2 * PYRAMID.bounding_radius
+    assert min(nearest) > 2 * DUMBBELL.bounding_radius
     assert pytest.approx(math.hypot(*scene.gravity)) == GRAVITY
 
 

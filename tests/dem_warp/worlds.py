@@ -109,6 +109,22 @@ def pair(
     return ContactCoefficients.of_pair(GRAIN, partner, interaction, laws, mechanisms, RADIUS, ball_mass())
 
 
+ALONG = {
+    "cdt": {"tangential_history": "force"},
+    "relative_constant": {"tangential_history": "rescaled_displacement"},
+    "edem_rvd": {"tangential_history": "rescaled_force"},
+    "yade": {"friction_load": "size"},
+}
+"""Choices of laws that tests of a rolling resistance take along, so that both compile one build: the former are
+tested without rolling resistance, the latter under a constant load, where the choices taken along are alike."""
+
+
+def along(**choice: str) -> ContactLaws:
+    """Return the laws of a choice with the rolling resistance that takes it along."""
+    [rolling] = [name for name, taken in ALONG.items() if taken == choice] or ["own_spin"]
+    return ContactLaws(rolling=rolling, **choice)
+
+
 def world(
     bodies: Grains,
     contact: ContactCoefficients,
