@@ -115,8 +115,9 @@ ALONG = {
     "edem_rvd": {"tangential_history": "rescaled_force"},
     "yade": {"friction_load": "size"},
 }
-"""Choices of laws that tests of a rolling resistance take along, so that both compile one build: the former are
-tested without rolling resistance, the latter under a constant load, where the choices taken along are alike."""
+"""Choices of laws that tests of a rolling resistance take along, so that both compile one build.
+
+They are tested without rolling resistance, and it is tested under a constant load, where they are all alike."""
 
 
 def along(**choice: str) -> ContactLaws:
