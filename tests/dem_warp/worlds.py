@@ -117,7 +117,7 @@ ALONG = {
 }
 """Choices of laws that tests of a rolling resistance take along, so that both compile one build.
 
-They are tested without rolling resistance, and it is tested under a constant load, where they are all alike."""
+They are tested without rolling resistance; it is tested under a constant load, where they are all alike."""
 
 
 def along(**choice: str) -> ContactLaws:
