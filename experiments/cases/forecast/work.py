@@ -72,7 +72,8 @@ class _Test:
 @lru_cache(maxsize=1024)
 def _phases(test: _Test) -> tuple[tuple[str, float], ...]:
     """Time that a test expects of each of its phases with one grain [s]."""
-    case = replace(test.case, scene=replace(test.scene, grain_count=1))
+    weighed = {"mass": None} if getattr(test.scene, "mass", None) else {}  # a mass excludes a count
+    case = replace(test.case, scene=replace(test.scene, grain_count=1, **weighed))
     [setup] = case.scene.prepare([case], resolve_device(None))
     phases = case.scene.controller(case, setup, CHUNK).phases
     return tuple((name, float(phase.expected)) for name, phase in phases.items())

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from dem_warp import MECHANISMS, SCENES, CaseResult, simulate
+from dem_warp import MECHANISMS, SCENES, CaseResult, PouredHeap, simulate
 from experiments.cases import OwnWorkers
 from experiments.cases.forecast import speed
 from experiments.cases.forecast.speed import (
@@ -65,6 +65,14 @@ def test_a_case_takes_its_rain_and_the_phases_that_its_test_expects(small_study:
     assert seconds[1] - seconds[0] == pytest.approx(300 / case.scene.rain_rate)
     fixed = replace(case, scene=replace(case.scene, duration=2.5))
     assert work_of(fixed).steps * case.time_step == pytest.approx(2.5)
+
+
+def test_a_weighed_portion_takes_as_long_as_its_grains(small_study: Study) -> None:
+    case = small_study.case({}, 1)
+    funnel = PouredHeap(0.04, 0.05, 0.015, case.scene.wall_material, mass=0.002)
+    weighed = work_of(replace(case, scene=funnel))
+    counted = replace(funnel, mass=None, grain_count=weighed.grains)
+    assert weighed == work_of(replace(case, scene=counted))
 
 
 def test_cores_share_the_work_and_none_ends_before_its_longest_case() -> None:
