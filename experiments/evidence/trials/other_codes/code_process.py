@@ -23,7 +23,6 @@ from experiments.evidence.trials.other_codes.dump_reading import (
     read_balance,
     read_film,
 )
-from experiments.evidence.trials.other_codes.lammps_trials import lammps_files
 from experiments.evidence.trials.other_codes.liggghts_trials import liggghts_files
 from experiments.io.errors import InputError
 from experiments.studyfile.observables import OBSERVABLES, PHOTOGRAPHED
@@ -87,7 +86,6 @@ class OtherCode:
 
 
 CODES = {
-    "lammps": OtherCode("LAMMPS", "lmp", lammps_files),
     "liggghts": OtherCode("LIGGGHTS", "liggghts", liggghts_files),
 }
 """Codes that make a second reality, by name."""

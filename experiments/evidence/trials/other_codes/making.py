@@ -6,20 +6,6 @@ _TILT = "gravity turned towards +x: the same"
 _SIZES = "five classes of size with the moments of the normal spread, at the same mean mass"
 
 MADE: Mapping[str, Mapping[str, str]] = {
-    "lammps": {
-        "contact_adhesion": (
-            "`dmt` in the place of `hertz/material` among grains: Hertz's force less JKR's largest pull; no "
-            "adhesion beyond the touch, and friction takes Hertz's force as its load"
-        ),
-        "plate_tilt": _TILT,
-        "rolling_torque": (
-            "`sds` against the relative rotation with the lever R*: a spring with a dashpot and a slider; "
-            "where the study has a torque against each grain's own spin, whose lever is the distance to the "
-            "grain's centre, the coefficient gives the same mean torque"
-        ),
-        "size_spread": _SIZES,
-        "vibration": "the plate, a region, moves as ours does, from the lift on for the same time",
-    },
     "liggghts": {
         "contact_adhesion": (
             "`sjkr`: k 2 pi R* d while spheres overlap, with k for JKR's largest pull between two spheres; "
@@ -42,12 +28,6 @@ MADE: Mapping[str, Mapping[str, str]] = {
 """For each code, the effects that it can make, and how."""
 
 LAWS: Mapping[str, str] = {
-    "lammps": (
-        "`hertz/material` with `damping tsuji` and `tangential mindlin`, at the numbers that give our "
-        "damping: Coulomb's limit takes the size of the normal force, and where a contact slides its spring "
-        "makes up for the dashpot, while ours slides undamped; contacts with the tube, a cylinder, are "
-        "stiffer by r / 4R or so"
-    ),
     "liggghts": (
         "`hertz` with `tangential history`: Coulomb's limit holds for the spring alone, so that spring and "
         "dashpot of a contact that sticks may pass it together, and takes the size of the normal force; ours "

@@ -21,14 +21,11 @@ _STREAM = 2
 """Stream of random numbers of a trial's seed; 1 is that of its camera."""
 
 LAWS: Mapping[str, ContactLaws] = {
-    "lammps": replace(PRESETS["lammps"], restitution="closed_form", tangential_damping="tsuji"),
     "liggghts": PRESETS["liggghts"],
 }
-"""Laws of each code, but for rolling. LAMMPS gets the damping that the restitution means here: what it
-itself makes of the number is another grain, whose heap is flatter by a standard deviation."""
+"""Laws of each code, but for rolling."""
 
 ROLLING: Mapping[str, tuple[Rolling, ...]] = {
-    "lammps": ("sds",),
     "liggghts": ("cdt", "epsd2"),
 }
 """Resistances to rolling of each code."""

@@ -37,20 +37,14 @@ from experiments.studyfile.observables import NAMES, OUTLINE
 THETA = {"mu_gg": 0.6, "mu_gw": 0.5, "e_gg": 0.3}
 COUNT = 24
 SMALL = {"scene": {"lifted-cylinder": {"grain_count": COUNT, "height": "25 mm"}}}
-PROGRAMS = {"lammps": "lmp", "liggghts": "liggghts"}
 SETTING = Setting(1.0, 1000.0, 48, 4e-3, "cdt")
-SETTINGS = {"lammps": replace(SETTING, rolling="sds"), "liggghts": SETTING}
 G = 9.81
 
-with_programs = pytest.mark.parametrize(
-    "code", [pytest.param(code, marks=pytest.mark.program(name)) for code, name in PROGRAMS.items()]
-)
 
-
-def case_of(code: str = "liggghts") -> Case:
-    """Return a test of few grains, in the setting of a code's workshop."""
+def case_of() -> Case:
+    """Return a test of few grains, in the setting of LIGGGHTS's workshop."""
     case = load_study(STUDY, "bench", SMALL).case(THETA, seed=3)
-    return SETTINGS[code].of(case, code)
+    return SETTING.of(case, "liggghts")
 
 
 SHAPE = case_of().grains.mixture.shapes[0]
@@ -253,7 +247,7 @@ def test_the_plan_holds_at_least_120_trials_of_what_the_code_can_make() -> None:
     assert plan.nulls + singles + plan.pairs + plan.outside * len(OUTSIDE) >= 120
     with pytest.raises(InputError, match="liggghts makes only"):
         plan_for("liggghts", Plan(mechanisms=("air_drag",)))
-    with pytest.raises(InputError, match="must be one of lammps, liggghts"):
+    with pytest.raises(InputError, match="must be one of liggghts"):
         engine_for("edem")
 
 
@@ -280,19 +274,19 @@ Sizes = tuple[tuple[str, float], ...]
 """Effects of a test with their sizes."""
 
 
-def observed(code: str, folder: Path, *sizes: Sizes, seed: int = 12) -> list[dict[str, float] | str]:
+def observed(folder: Path, *sizes: Sizes, seed: int = 12) -> list[dict[str, float] | str]:
     """Observables of small tests that a code runs, each with some effects; or why one has no heap."""
     study, table = load_study(STUDY, "bench", SMALL), OutcomeTable(folder / "outcomes.sqlite")
     points = [Point(tuple(THETA.values()), own, "base", seed) for own in sizes]
-    with OtherCodeSimulator(study, code, SETTINGS[code], table, OwnWorkers("cpu", 1)) as simulator:
+    with OtherCodeSimulator(study, "liggghts", SETTING, table, OwnWorkers("cpu", 1)) as simulator:
         outcomes = simulator(points)
     rows = [dict(zip(simulator.observables, row, strict=True)) for row in outcomes.values]
     return [reason or row for row, reason in zip(rows, outcomes.reasons, strict=True)]
 
 
-@with_programs
-def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) -> None:
-    [seen] = observed(code, tmp_path, ())
+@pytest.mark.program("liggghts")
+def test_a_code_makes_a_heap_that_our_functions_read(tmp_path: Path) -> None:
+    [seen] = observed(tmp_path, ())
     assert not isinstance(seen, str)
     assert set(seen) == {*NAMES, *(each.name for each in OUTLINE)}
     assert np.isfinite(list(seen.values())).all()
@@ -303,17 +297,17 @@ def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) 
     assert 0.0 < seen["wall_drag"] < 1.0
     # it is kept: no program is asked for again
     assert len(OutcomeTable(tmp_path / "outcomes.sqlite")) == 1
-    assert observed(code, tmp_path, ()) == [seen]
+    assert observed(tmp_path, ()) == [seen]
 
 
-@with_programs
-def test_a_code_makes_every_effect(code: str, tmp_path: Path) -> None:
-    left = {name: _largest(name) for name in MADE[code]}
+@pytest.mark.program("liggghts")
+def test_a_code_makes_every_effect(tmp_path: Path) -> None:
+    left = {name: _largest(name) for name in MADE["liggghts"]}
     left |= {name: effect.maximum for name, effect in OUTSIDE.items()}
     # so few grains may leave no heap that can be read: another filling decides then
     for seed in (12, 13, 14, 15):
         effects = tuple(((name, size),) for name, size in left.items())
-        without, *with_one = observed(code, tmp_path, (), *effects, seed=seed)
+        without, *with_one = observed(tmp_path, (), *effects, seed=seed)
         if isinstance(without, str):
             continue
         for name, seen in zip(tuple(left), with_one, strict=True):
