@@ -38,17 +38,12 @@ CHANGES: dict[str, Any] = {
 }
 """Changes to every study."""
 
-STEPS = {"yade": 0.1}
-"""Time steps over that of Rayleigh, of laws in which grains tremble at the usual one: Yade's rolling springs
-are not damped."""
-
 COLUMNS = ("study", "target", "mean", "sd", "n", "difference", "low", "high", "met", "equivalent")
 
 
 def in_laws(file: Path, scale: str | None, laws: str) -> Study:
     """Load a study in other laws, with the changes that they ask for."""
-    steps = {"numerics": {"time_step_fraction": STEPS[laws]}} if laws in STEPS else {}
-    return load_study(file, scale, CHANGES | {"solver": {"laws": laws}} | steps)
+    return load_study(file, scale, CHANGES | {"solver": {"laws": laws}})
 
 
 def prove(study: Study, folder: Path, laws: str, seeds: int, workers: int | None) -> dict[str, object]:

@@ -3,26 +3,31 @@
     python -m experiments.evidence.studies.abs_beads run --out out/abs-beads
     python -m experiments.evidence.studies.abs_beads predict --out out/abs-beads
 
-The first needs a GPU; ``--scale bench --device cpu`` has small tests for two cores. What a folder holds is
-not simulated again. The second writes the bands.
+The first needs a GPU, and neither pandas nor OpenCV; ``--scale bench --device cpu`` has small tests for two
+cores. What a folder holds is not simulated again. The second measures the states, and writes the bands.
 """
 
+from __future__ import annotations
+
+import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import pandas as pd
 import typer
 from scipy.stats import norm, qmc
 
-from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.commands.console import clear_errors
 from experiments.commands.options import OneDevice
+from experiments.evidence.studies.batch import FACTS, measured_cases, simulate_missing
 from experiments.evidence.studies.drum_commands import Out, require_run
 from experiments.io.files import require_folder, write_text
-from experiments.studyfile import load_study
+from experiments.studyfile import Study, load_study
 
-CASES, PREDICTION = "cases.csv", "prediction.csv"
+if TYPE_CHECKING:
+    import pandas as pd
+
+PREDICTION = "prediction.csv"
 
 READINGS = {
     "mu_gg": (0.35, 0.06, 10),
@@ -55,11 +60,25 @@ def errors(model: float) -> np.ndarray:
     return np.array([np.hypot(sd / np.sqrt(n), model * mean) for mean, sd, n in READINGS.values()])
 
 
-def parameter_sets() -> pd.DataFrame:
+def parameter_sets() -> np.ndarray:
     """Draw parameters from the readings with the largest error of the model: a Latin hypercube of normals."""
     cube = qmc.LatinHypercube(len(READINGS), optimization="random-cd", rng=7).random(SETS)
     means = np.array([mean for mean, *_ in READINGS.values()])
-    return pd.DataFrame(means + errors(MODEL_ERRORS[-1]) * norm.ppf(cube), columns=list(READINGS))
+    return means + errors(MODEL_ERRORS[-1]) * norm.ppf(cube)
+
+
+def planned_cases() -> list[dict[str, Any]]:
+    """Lay out the cases: all tests of all parameter sets."""
+    planned = [(scene, row) for scene, *_ in QUANTITIES.values() for row in parameter_sets().tolist()]
+    return [
+        {"scene": scene, "seed": 9000 + number, **dict(zip(READINGS, row, strict=True))}
+        for number, (scene, row) in enumerate(planned)
+    ]
+
+
+def study_at(scale: str) -> Study:
+    """Load the study at a scale."""
+    return load_study(Path(__file__).with_name("study.toml"), scale)
 
 
 def bands(cases: pd.DataFrame) -> pd.DataFrame:
@@ -68,6 +87,8 @@ def bands(cases: pd.DataFrame) -> pd.DataFrame:
     The quantity is linear in the parameters; what is left of the simulated ones, the seed's noise and what
     bends, is that of the measured one too.
     """
+    import pandas as pd
+
     means, rng, rows = np.array([mean for mean, *_ in READINGS.values()]), np.random.default_rng(8), []
     for name, (scene, observable, unit) in QUANTITIES.items():
         found = cases[(cases["scene"] == scene) & cases[observable].notna()]
@@ -98,21 +119,17 @@ def run(
     """Simulate all tests of all parameter sets at once."""
     with clear_errors("What is stored is not simulated again."):
         require_folder(out)
-        study = load_study(Path(__file__).with_name("study.toml"), scale)
-        scenes = [scene for scene, *_ in QUANTITIES.values()]
-        table = pd.concat([parameter_sets().assign(scene=scene) for scene in scenes], ignore_index=True)
-        table["seed"] = 9000 + table.index
-        found = run_cases(study, table, Store(out / "cases"), OwnWorkers(device, workers))
-        write_text(out / CASES, found.to_csv(index=False))
-        print(found["status"].value_counts().to_string())
+        simulate_missing(study_at(scale), planned_cases(), out, device, workers)
 
 
 @app.command()
 def predict(out: Out = Path("out/abs-beads")) -> None:
-    """Write the bands."""
+    """Measure the states of a run, and write the bands."""
     with clear_errors():
-        require_run(out, CASES)
-        table = bands(pd.read_csv(out / CASES))
+        require_run(out, FACTS)
+        study = study_at(json.loads((out / FACTS).read_text(encoding="utf-8"))["scale"])
+        kept = ("status", "reason", *dict.fromkeys(observable for _, observable, _ in QUANTITIES.values()))
+        table = bands(measured_cases(study, planned_cases(), out, kept))
         write_text(out / PREDICTION, table.to_csv(index=False))
         print(table.to_string(index=False))
 

@@ -8,11 +8,10 @@ import numpy as np
 import pandas as pd
 
 from doe.plots.palette import BLUE, INK, VERMILION
-from experiments.cases import Store, run_cases
 from experiments.evidence.page_figures import new_axes, save_figure
 from experiments.evidence.record_page import facts_list, markdown_table, wall_times_table, write_page
+from experiments.evidence.studies.batch import CASES, FACTS, measured_cases
 from experiments.evidence.studies.drum_commands import require_run
-from experiments.evidence.studies.wheat.wheat_campaign import CASES, FACTS, STORE
 from experiments.evidence.studies.wheat.wheat_fit import LEVEL, OPEN, Bench, WheatFit, fit_tests
 from experiments.evidence.studies.wheat.wheat_plan import (
     DENSITY,
@@ -23,7 +22,6 @@ from experiments.evidence.studies.wheat.wheat_plan import (
     planned_cases,
     study_at,
 )
-from experiments.io.files import write_text
 from experiments.report.kit.table import make_table
 from experiments.studyfile import Study
 
@@ -33,21 +31,12 @@ KEPT = ("status", "reason", "grain_count", *dict.fromkeys(RESPONSES.values()))
 """Columns that are kept of what a case gives."""
 
 
-def measured_cases(study: Study, scale: str, folder: Path) -> pd.DataFrame:
-    """Read the table of a run; where it has none, measure the states that it simulated."""
-    if not (folder / CASES).is_file():
-        table = pd.DataFrame(planned_cases(study, scale))
-        found = run_cases(study, table, Store(folder / STORE)).reindex(columns=[*table.columns, *KEPT])
-        write_text(folder / CASES, found.to_csv(index=False, float_format="%.6g"))
-    return pd.read_csv(folder / CASES)
-
-
 def write_record(folder: Path) -> Path:
     """Write the page of a run and its picture."""
     require_run(folder, FACTS)
     facts = json.loads((folder / FACTS).read_text(encoding="utf-8"))
     study, measured = study_at(facts["scale"]), data()
-    table = measured_cases(study, facts["scale"], folder)
+    table = measured_cases(study, planned_cases(study, facts["scale"]), folder, KEPT)
     tests, drums = Bench.of(study, table), {*measured} - {HEAP, DENSITY}
     fits = {
         "drums": fit_tests(tests, measured, drums),

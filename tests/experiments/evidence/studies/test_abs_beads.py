@@ -22,8 +22,8 @@ def test_a_band_holds_the_errors_of_readings_model_and_seed() -> None:
     rng, means = np.random.default_rng(3), np.array([mean for mean, *_ in READINGS.values()])
     tables = []
     for scene, observable, _ in QUANTITIES.values():
-        table = parameter_sets().assign(scene=scene)
-        exact = 25.0 + (table[list(READINGS)].to_numpy() - means) @ SLOPES
+        table = pd.DataFrame(parameter_sets(), columns=list(READINGS)).assign(scene=scene)
+        exact = 25.0 + (parameter_sets() - means) @ SLOPES
         tables.append(table.assign(**{observable: exact + rng.normal(0.0, NOISE, len(table))}))
     found = bands(pd.concat(tables))
     for model, rows in found.groupby("model_error"):

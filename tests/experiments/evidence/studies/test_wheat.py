@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from experiments.evidence.studies import batch
 from experiments.evidence.studies.cellulose import cellulose_campaign
 from experiments.evidence.studies.cellulose.__main__ import app as cellulose_app
 from experiments.evidence.studies.wheat import wheat_campaign, wheat_page, wheat_plan
@@ -115,12 +116,12 @@ def test_a_datum_that_contradicts_the_others_is_seen(study):
 
 @pytest.mark.usefixtures("few_moves")
 def test_a_run_is_measured_and_has_its_page(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(wheat_campaign.OwnWorkers, "simulate", lambda *arguments, checkpoint: [])
+    monkeypatch.setattr(batch.OwnWorkers, "simulate", lambda *arguments, checkpoint: [])
     wheat_campaign.run_study("bench", tmp_path, "cpu")
-    facts = json.loads((tmp_path / wheat_campaign.FACTS).read_text())
+    facts = json.loads((tmp_path / batch.FACTS).read_text())
     assert facts["scale"] == "bench"
     assert facts["wall_times"][0]["simulated"] == sum(wheat_plan.POINTS["bench"].values())
-    monkeypatch.setattr(wheat_page, "run_cases", lambda *arguments: cases_of(study).assign(status="finished"))
+    cases_of(study).assign(status="finished").to_csv(tmp_path / batch.CASES)
     page = wheat_page.write_record(tmp_path).read_text(encoding="utf-8")
     assert "| heap | 31.7 |" in page
     assert (tmp_path / "data.png").is_file()
