@@ -7,7 +7,7 @@ import numpy as np
 
 from imaging.geometry import Picture
 
-FINE = 4
+FINE = 3
 """Shapes are drawn this many times finer than the picture, then averaged."""
 
 

@@ -100,12 +100,15 @@ def test_a_heap_that_is_ended_says_how_to_continue(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(one_heap, "simulate_heap", lambda *_: os.kill(os.getpid(), ending))
+    # what a test is started from may ignore Ctrl-C
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     study = write_study().rename(tmp_path / "my wheat.toml")
     words = [study.name, "--out", "my heap", "--set", "E=0.5", "--seed", "3", "--device", "cpu", "--json"]
     again = "dem-warp heap 'my wheat.toml' --out 'my heap' --device cpu --set E=0.5 --seed 3 --json --resume"
     for more in ([], ["--resume"]):
         result = CliRunner().invoke(app, ["heap", *words, *more])
         assert (result.exit_code, f"{said} Resume with: {again}\n" in result.stderr) == (ended, True)
+    signal.signal(signal.SIGINT, before)
 
 
 def test_an_option_with_several_values_is_repeated() -> None:
