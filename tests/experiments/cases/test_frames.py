@@ -30,9 +30,9 @@ def filmed(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> Path:
     folder = tmp_path_factory.mktemp("Körner und Rahmen")
     (folder / "two.txt").write_text("-0.001 0 0 0.0015\n0.001 0 0 0.0015\n", encoding="utf-8")
     study = folder / "study.toml"
-    study.write_text(
-        small_text.replace('sphere = "2 mm"', 'clump = "two.txt"\nclump_unit = "m"'), encoding="utf-8"
-    )
+    text = small_text.replace('sphere = "2 mm"', 'clump = "two.txt"\nclump_unit = "m"')
+    # the laws of a new study, whose kernels another test compiles, too
+    study.write_text(f'{text}\n[solver]\nlaws = "relative"\n', encoding="utf-8")
     words = ("heap", study, "--device", "cpu", "--frames", COUNT)
     code, _, err = dem_warp(*words, "--out", folder / "filmed")
     assert code == 0, err

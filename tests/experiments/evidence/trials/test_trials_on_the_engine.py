@@ -31,7 +31,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Measured]:
     folder = Folder(tmp_path_factory.mktemp("trials"))
     declaration = Declaration("", BENCH, "", Plan(replicates=REPLICATES), Settings(), (), ())
     study, table = generators_study(BENCH), OutcomeTable(folder.hidden / "outcomes.sqlite")
-    with EngineSimulator(study, library_for(study), table, OwnWorkers("cpu")) as engine:
+    with EngineSimulator(study, library_for(study), table, OwnWorkers("cpu", 1)) as engine:
         measure_trials(folder, [NULL, ROLLING], declaration, engine)
     sealed = [Sealed(label.trial, "alone", (), label.hash) for label in (NULL, ROLLING)]
     found, refused = read_data(folder, sealed, load_study(STUDY, BENCH))
