@@ -63,8 +63,9 @@ def test_laws(law, check):
     check(law)
 
 
-@pytest.mark.parametrize("scene", SCENES)
+# The checks of a scene follow one another, and share its run.
 @pytest.mark.parametrize("check", testing.SCENE_CHECKS, **names)
+@pytest.mark.parametrize("scene", SCENES)
 def test_scenes(scene, check):
     check(CASES[scene])
 
