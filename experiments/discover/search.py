@@ -33,6 +33,7 @@ from experiments.discover.mirror import odd_observables
 from experiments.io.errors import InputError, StudyError
 from experiments.io.texts import nearest_name
 from experiments.studyfile import Study
+from experiments.studyfile.campaign import near_readings
 from experiments.studyfile.mechanism_factor import MechanismFactor
 
 WITHOUT_EFFECT = (
@@ -68,8 +69,8 @@ class Search:
 
     @property
     def space(self) -> SearchSpace:
-        """Names and ranges of all that varies."""
-        factors, conditions = self.study.factors, self.study.conditions
+        """Names and ranges of all that varies; a direct reading narrows the range of its factor."""
+        factors, conditions = near_readings(self.study.factors, self.study.direct), self.study.conditions
         return SearchSpace(
             tuple(factor.name for factor in factors),
             tuple(factor.low for factor in factors),
@@ -132,6 +133,12 @@ class Search:
         foreign = [one.name for one in emulator.space.mechanisms if one not in known]
         lacking = [one.name for one in known if one not in bank.space.mechanisms]
         notes = [f"{name} is not in the bank, so it was not looked for" for name in lacking]
+        ranges = zip(self.space.factors, self.space.lower, self.space.upper, strict=True)
+        notes += [
+            f"{name} is searched from {low:.4g} to {high:.4g}, three standard errors about its direct reading"
+            for name, low, high in ranges
+            if name in {one.factor for one in self.study.direct}
+        ]
         notes += notes_on(bank.maker, engine_of(self.study))
         emulator = replace(emulator.without(*foreign), notes=(*emulator.notes, *notes))
         return analyse(measured, emulator, self.settings, seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,7 @@ from experiments.runs.choices import Prepared, measured_study, prepare
 from experiments.runs.request import RunRequest
 from experiments.runs.run_folder import Run, open_run
 from experiments.studyfile import Study
-from experiments.studyfile.campaign import Response, scenes_of
+from experiments.studyfile.campaign import Response, near_readings, scenes_of
 from experiments.studyfile.candidate_section import Candidate
 
 CENTER, MOST_FACTORS = 5, 5
@@ -118,15 +118,8 @@ def _targets(study: Study) -> tuple[Response, ...]:
 
 def _factors(study: Study) -> tuple[Factor, ...]:
     """Return the factors that are kept, or all, as near to their direct readings as errors allow."""
-    kept = {
-        one.name: one for one in study.factors if one.name in (study.campaign.selection.keep or study.labels)
-    }
-    for direct in study.direct:
-        if factor := kept.get(direct.factor):
-            reach, middle = 3.0 * (direct.measured.se**2 + direct.model_sd**2) ** 0.5, direct.measured.mean
-            low, high = max(middle - reach, factor.low), min(middle + reach, factor.high)
-            kept[direct.factor] = replace(factor, low=low, high=high) if low < high else factor
-    return tuple(kept.values())
+    names = study.campaign.selection.keep or study.labels
+    return near_readings([one for one in study.factors if one.name in names], study.direct)
 
 
 def _sizes(study: Study, candidate: Candidate, seconds: float) -> Iterable[Size]:

@@ -9,7 +9,7 @@ at its high level.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from experiments.studyfile.schema import Angle, Section, nested_error
 
 if TYPE_CHECKING:
-    from doe import Sample
+    from doe import Factor, Sample
 
 
 def _in_natural_units(values: object, info: ValidationInfo) -> object:
@@ -258,6 +258,17 @@ class Direct:
     def title(self) -> str:
         """Method and factor in words."""
         return f"{self.by} of {self.factor}"
+
+
+def near_readings(factors: Iterable[Factor], direct: Iterable[Direct]) -> tuple[Factor, ...]:
+    """Narrow factors to three standard errors about their direct readings, as far as that leaves a range."""
+    found = {factor.name: factor for factor in factors}
+    for one in direct:
+        if factor := found.get(one.factor):
+            reach, middle = 3.0 * (one.measured.se**2 + one.model_sd**2) ** 0.5, one.measured.mean
+            low, high = max(middle - reach, factor.low), min(middle + reach, factor.high)
+            found[one.factor] = replace(factor, low=low, high=high) if low < high else factor
+    return tuple(found.values())
 
 
 @dataclass(frozen=True)

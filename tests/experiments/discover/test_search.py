@@ -100,6 +100,16 @@ def test_a_study_may_have_its_effects_searched_up_to_other_sizes() -> None:
     assert ends == theirs | {"plate_tilt": pytest.approx(5.72958, rel=1e-6), "rolling_torque": 0.4}
 
 
+def test_a_direct_reading_narrows_the_range_of_its_factor(bank: Path) -> None:
+    reading = {"parameter": "mu_gg", "by": "value", "mean": "0.6", "sd": "0.03", "n": 9, "model_sd": "0.02"}
+    search, whole = Search.of(trial(direct=[reading])), Search.of(trial()).space
+    # three times the root of 0.03^2 / 9 + 0.02^2
+    assert search.space.lower == pytest.approx((0.6 - 0.067082, *whole.lower[1:]), rel=1e-5)
+    assert search.space.upper == pytest.approx((0.6 + 0.067082, *whole.upper[1:]), rel=1e-5)
+    with pytest.raises(InputError, match="of a study with another grain"):
+        search.read_bank(bank)  # made for the whole range
+
+
 def test_a_bank_of_other_largest_sizes_does_not_know_the_effect(bank: Path) -> None:
     search = Search.of(trial(discover={"maxima": {"rolling_torque": 0.4}}))
     known = search.read_bank(bank).space.mechanisms
