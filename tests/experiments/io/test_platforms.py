@@ -114,19 +114,21 @@ verification.replicates = 4
 ENGINE = f"\n[engine]\ncommand = \"'{sys.executable}' '{CONES}'\"\n"
 
 
-PROGRAM = """
+MAIN = "from experiments.cli import main; main()"
+OBSERVED = f"""
 import atexit, sys
-from experiments.cli import main
 from experiments.report import solid
 solid.PIXELS = 200
 atexit.register(lambda: print("loaded", *sys.modules))
-main()
+{MAIN}
 """
 
 
-def run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
+def run(
+    folder: Path, *words: str, program: str = MAIN, **environment: str
+) -> subprocess.CompletedProcess[bytes]:
     """Run the command line as a process of its own."""
-    command = [sys.executable, "-c", PROGRAM, *words]
+    command = [sys.executable, "-c", program, *words]
     settings = os.environ | {"PYTHONPATH": str(ROOT), **environment}
     return subprocess.run(command, cwd=folder, env=settings, capture_output=True, check=False)
 
@@ -138,7 +140,7 @@ def test_a_campaign_runs_in_new_processes_under_a_bare_locale(tmp_path: Path, sm
     (folder / "Weizen groß.toml").write_text(small_text + FEW_CASES + ENGINE, encoding="utf-8")
     words = ("calibrate", "Weizen groß.toml", "--device", "cpu", "--workers", "1", "--out", "aus gabe ü")
     bare = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONWARNDEFAULTENCODING": "1"}
-    done = run(folder, *words, **bare)
+    done = run(folder, *words, program=OBSERVED, **bare)
     printed = done.stderr.decode("utf-8", "replace")
     assert done.returncode == 0, printed
     results = json.loads((folder / "aus gabe ü" / "results.json").read_text(encoding="utf-8"))
