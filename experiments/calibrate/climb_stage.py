@@ -110,7 +110,7 @@ def _walk(
     batches, tables = [_first_points(study, line)], []
     for _ in range(1 + settings.extensions):
         steps = batches[-1][list(line.kept)]
-        tables.append(runner(plan_cases(study, STAGE, steps, settings.replicates, [response])))
+        tables.append(runner(plan_cases(study, STAGE, steps, study.campaign.climb_replicates, [response])))
         points, cases = pd.concat(batches).sort_index(), pd.concat(tables, ignore_index=True)
         path = _path_table(points, cases, response, target.leading.mean)
         end = _end(path, measured(cases, response)[["run", response.observable]], noise.leading, settings)

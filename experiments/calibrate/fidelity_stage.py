@@ -1,38 +1,18 @@
-"""A cheaper scale: how far it is from the study's own, and the surface moved there by a few runs."""
+"""A surface of a cheaper scale, moved to the study's own by the climb and a few further runs there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
-from doe import (
-    DesignError,
-    Goal,
-    JointFit,
-    Sample,
-    Surface,
-    TargetError,
-    Transfer,
-    joint_fit,
-    spread_points,
-    transfer,
-)
-from experiments.calibrate.cases import (
-    Runner,
-    failure_summary,
-    measured,
-    middle,
-    plan_cases,
-    too_many_failed,
-    values_of,
-)
+from doe import DesignError, Sample, Surface, TargetError, Transfer, spread_points, transfer
+from experiments.calibrate.cases import Runner, failure_summary, measured, plan_cases, too_many_failed
 from experiments.calibrate.results import (
+    ClimbResult,
     Decision,
     FidelityResult,
-    NoiseFloorResult,
     SurfaceResult,
     TargetResult,
 )
@@ -42,78 +22,51 @@ from experiments.studyfile.campaign import FidelitySettings, Response
 
 STAGE = "fidelity"
 
+ROUNDING = 1e-9
+"""Share of the design's reach by which a run of the climb may seem to be outside."""
+
 LEAST = 4
-"""Fewest runs of the first round, apart from one a factor: shift, scale and noise need them."""
+"""Fewest further runs, apart from one a factor: shift, scale and noise need them."""
 
-MIDDLE = 1000
-"""Number of the run with every factor at its middle."""
-
-
-OWN_SCALE = ("target", "verification", "fidelity")
+OWN_SCALE = ("target", "climb", "verification", "fidelity")
 """Stages whose cases have the study's own scale where the design has a cheaper one."""
 
 
-def measure_shifts(
-    study: Study, settings: FidelitySettings, noise: NoiseFloorResult, runner: Runner
-) -> FidelityResult:
-    """Run the middle at the study's own scale, and compare it with the noise floor of the cheaper one."""
-    responses = study.target.fitted
-    center = pd.DataFrame([middle(study.factors)], index=[MIDDLE])
-    cases = runner(plan_cases(study, STAGE, center, settings.middle, responses))
-    shifts = {
-        r.name: float(values_of(cases, STAGE, r).mean()) - noise.responses[r.name].mean for r in responses
-    }
-    said = [f"{r.name} {quantity(shifts[r.name], r.unit, '+')}" for r in responses]
-    decision = Decision(
-        STAGE,
-        "The climb's target is moved by the difference of the two scales with every factor at its middle.",
-        {key_of("difference", r): shifts[r.name] for r in responses},
-        f"From the scale {settings.scale} to this one: {', '.join(said)}.",
-    )
-    return FidelityResult({}, settings.scale, shifts, cases, (decision,))
-
-
-def moved_target(target: TargetResult, middles: FidelityResult) -> TargetResult:
-    """Return the target as the cheaper scale is expected to give it."""
-    moved = {
-        name: Sample(sample.mean - middles.shifts.get(name, 0.0), sample.sd, sample.n)
-        for name, sample in target.responses.items()
-    }
-    return replace(target, responses=moved)
+def further_runs(settings: FidelitySettings, climbed: int, factors: int) -> int:
+    """Return how many runs move the surface next to those of the climb."""
+    return max(settings.runs - climbed, LEAST + factors)
 
 
 def carry_surface(
     study: Study,
     settings: FidelitySettings,
+    path: ClimbResult,
     surface: SurfaceResult,
     target: TargetResult,
-    middles: FidelityResult,
     runner: Runner,
 ) -> FidelityResult:
-    """Move the surfaces to the study's own scale, by runs in two rounds; StageEnd where too few give a value.
+    """Move the surfaces to the study's own scale by the climb's runs inside the design and some further ones.
 
-    The first runs are chosen for the whole region of the design, the second for what is compatible then.
+    The further ones are chosen for where the cheaper surface is as at the crossing. The full surfaces are
+    moved: terms that show nothing at one scale may show at the other. StageEnd where too few give a value.
     """
-    factors, responses = surface.design.factors, study.target.fitted
-    sources = {
-        name: found.reduced if found.reduced.terms else found.full
-        for name, found in surface.responses.items()
-    }
-    joint = _joint(sources, target)
-    first = max(settings.runs - settings.runs // 2, LEAST + len(factors))
-    cells, made, cases = joint.cells[joint.explored], np.zeros((0, len(factors))), pd.DataFrame()
-    for count in (first, max(settings.runs - first, 1)):
-        points = spread_points(surface.leading.full, cells, count, made)
-        natural = {f.name: f.to_natural(column) for f, column in zip(factors, points.T, strict=True)}
-        runs = pd.DataFrame(natural, index=range(len(made) + 1, len(made) + count + 1))
-        cases = pd.concat([cases, runner(plan_cases(study, STAGE, runs, 1, responses))], ignore_index=True)
-        made, carried = np.vstack([made, points]), _carried(sources, target, cases, responses)
-        joint = _joint(carried, target)
-        mask = joint.region().mask
-        cells = joint.cells[mask if mask.any() else joint.explored]
-    said = [_decision(carried[r.name], target.responses[r.name], cases, r) for r in responses]
-    whole = pd.concat([middles.cases, cases], ignore_index=True)
-    return replace(middles, responses=carried, cases=whole, decisions=(*middles.decisions, *said))
+    design, responses, fit = surface.design, study.target.fitted, surface.leading.full
+    climbed = np.column_stack([f.to_coded(path.cases[f.name].to_numpy()) for f in design.factors])
+    reach = float(np.abs(design.points.to_numpy()).max())
+    radius = float(np.linalg.norm(design.points, axis=1).max()) * (1.0 + ROUNDING)
+    inside = np.linalg.norm(climbed, axis=1) <= radius
+    level = float(fit.predict(path.crossing or surface.center)["mean"].iloc[0])
+    near = fit.compatible_region(replace(target.leading, mean=level), extent=reach, radius=radius)
+    count = further_runs(settings, len(climbed), len(design.names))
+    cells = near.coded[near.mask] if near.mask.any() else design.points
+    points = spread_points(fit, cells, count, climbed[inside])
+    natural = {f.name: f.to_natural(column) for f, column in zip(design.factors, points.T, strict=True)}
+    runs = pd.DataFrame(natural, index=range(1, count + 1))
+    fresh = runner(plan_cases(study, STAGE, runs, 1, responses))
+    cases = pd.concat([path.cases[inside], fresh], ignore_index=True)
+    carried = {r.name: _carried(surface.responses[r.name].full, target, cases, r) for r in responses}
+    decisions = [_decision(carried[r.name], target.responses[r.name], cases, r) for r in responses]
+    return FidelityResult(carried, settings.scale, cases, tuple(decisions))
 
 
 def with_carried(surface: SurfaceResult, result: FidelityResult) -> SurfaceResult:
@@ -122,25 +75,13 @@ def with_carried(surface: SurfaceResult, result: FidelityResult) -> SurfaceResul
     return replace(surface, responses=found)
 
 
-def _carried(
-    sources: Mapping[str, Surface], target: TargetResult, cases: pd.DataFrame, responses: Iterable[Response]
-) -> dict[str, Transfer]:
-    """Move the surface of each response by the runs that gave it; StageEnd with too few."""
-    found = {}
-    for response in responses:
-        runs = measured(cases, response)
-        fit, level = sources[response.name], target.responses[response.name].mean
-        try:
-            found[response.name] = transfer(
-                fit, runs, runs[response.observable].to_numpy(dtype=float), level, slopes=True
-            )
-        except DesignError as error:
-            raise too_many_failed(cases, STAGE, f"cannot move the surface ({error})", response) from error
-    return found
-
-
-def _joint(fits: Mapping[str, Surface | Transfer], target: TargetResult) -> JointFit:
-    return joint_fit({name: Goal(fit, target.responses[name]) for name, fit in fits.items()})
+def _carried(full: Surface, target: TargetResult, cases: pd.DataFrame, response: Response) -> Transfer:
+    """Move the surface of a response by the runs that gave it; StageEnd with too few."""
+    runs, level = measured(cases, response), target.responses[response.name].mean
+    try:
+        return transfer(full, runs, runs[response.observable].to_numpy(dtype=float), level, slopes=True)
+    except DesignError as error:
+        raise too_many_failed(cases, STAGE, f"cannot move the surface ({error})", response) from error
 
 
 def _decision(carried: Transfer, target: Sample, cases: pd.DataFrame, response: Response) -> Decision:

@@ -262,10 +262,8 @@ class FidelityResult(_ByResponse["Transfer"]):
 
     scale: str
     """The cheaper scale."""
-    shifts: dict[str, float]
-    """Difference of the scales with every factor at its middle, by response; the climb's target was moved."""
     cases: pd.DataFrame
-    """Runs at the study's own scale, those at the middle too."""
+    """Runs at the study's own scale, those of the climb inside the design first."""
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:

@@ -13,7 +13,7 @@ from experiments.calibrate.cases import Runner, StageEnd, with_combinations
 from experiments.calibrate.checks import check_calibration
 from experiments.calibrate.climb_stage import climb, require_crossing
 from experiments.calibrate.directions import with_directions
-from experiments.calibrate.fidelity_stage import carry_surface, measure_shifts, moved_target, with_carried
+from experiments.calibrate.fidelity_stage import carry_surface, with_carried
 from experiments.calibrate.noise_stage import analyse_noise_floor, plan_noise_floor
 from experiments.calibrate.optimum_stage import find_optimum
 from experiments.calibrate.results import (
@@ -119,16 +119,13 @@ def _run(study: Study, record: _Record) -> tuple[Outcome, str]:
     settings, response = study.campaign.selection, study.target.leading
     selection = record.keep("selection", select_factors(settings, screening, noise, response))
     require_kept(study, selection)
-    fidelity = study.campaign.fidelity
-    middles = measure_shifts(study, fidelity, noise, record.run) if fidelity else None
-    aim = moved_target(target, middles) if middles else target
-    path = climb(study, screening, selection.kept, noise, aim, record.run)
-    require_crossing(study, record.keep("climb", path), aim)
+    path = climb(study, screening, selection.kept, noise, target, record.run)
+    require_crossing(study, record.keep("climb", path), target)
     surface = record.keep("surface", explore_surface(study, path, record.run))
     require_slope(study, surface, path)
-    if fidelity and middles:
-        moved = record.keep("fidelity", carry_surface(study, fidelity, surface, target, middles, record.run))
-        surface = record.stages["surface"] = with_carried(surface, moved)
+    if fidelity := study.campaign.fidelity:
+        moved = carry_surface(study, fidelity, path, surface, target, record.run)
+        surface = record.stages["surface"] = with_carried(surface, record.keep("fidelity", moved))
     optimum = record.keep("optimum", find_optimum(study, surface, target))
     verification = record.keep("verification", verify(study, optimum, target, record.run))
     return _verdict(study, optimum, verification)

@@ -13,6 +13,7 @@ import pandas as pd
 from dem_warp import Case
 from doe import central_composite
 from doe.discrepancy import bank_points
+from experiments.calibrate.fidelity_stage import further_runs
 from experiments.calibrate.screening_stage import screening_design
 from experiments.calibrate.stages import plan_opening
 from experiments.cases import Resources
@@ -99,20 +100,15 @@ def _campaign_stages(study: Study) -> list[_Stage]:
     opening = plan_opening(study, screening_design(study.factors, settings.screening))
     scenes = scenes_of(target.fitted)
     own, middle = ([one.case({}, 1, scene) for scene in scenes] for one in (study, cheaper))
-    steps = settings.climb.steps * settings.climb.replicates
+    steps = settings.climb.steps * settings.climb_replicates
     kept = len(settings.selection.keep or ()) or min(settings.selection.at_most, len(study.factors))
     surface = _surface_cases(study, kept) * len(scenes)
     fresh = settings.verification.replicates * len(scenes_of(target.responses))
-    moved = settings.fidelity.middle + settings.fidelity.runs if settings.fidelity else 0
-    at_own = [("runs at this scale", own, moved * len(scenes), moved * len(scenes))] if moved else []
+    moving = further_runs(settings.fidelity, steps, kept) * len(scenes) if settings.fidelity else 0
+    at_own = [("runs at this scale", own, moving, moving)] if moving else []
     return [
         ("target, noise floor, screening", _sampled(cheaper, opening), len(opening), len(opening)),
-        (
-            "climb",
-            [cheaper.case({}, 1, target.leading.scene)],
-            steps,
-            steps * (1 + settings.climb.extensions),
-        ),
+        ("climb", [study.case({}, 1, target.leading.scene)], steps, steps * (1 + settings.climb.extensions)),
         ("surface", middle, surface, surface),
         *at_own,
         ("verification", own, fresh, fresh),

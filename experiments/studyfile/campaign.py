@@ -189,9 +189,8 @@ class FidelitySettings(Section):
     scale: str
     """Name of the cheaper ``[scale.NAME]``."""
     runs: int = Field(default=12, ge=8, le=MOST)
-    """Runs at the study's own scale that move the surface."""
-    middle: int = Field(default=3, ge=2, le=MOST)
-    """Replicates there with every factor at its middle, which show the climb how far the scales are apart."""
+    """Runs at the study's own scale before the verification: those of the climb, then those that move the
+    surface, at least four and one a factor."""
 
 
 class CampaignSettings(Section):
@@ -207,6 +206,11 @@ class CampaignSettings(Section):
     verification: VerificationSettings = VerificationSettings()
     fidelity: FidelitySettings | None = None
     """Cheaper scale. Default: every case has the study's own scale."""
+
+    @property
+    def climb_replicates(self) -> int:
+        """Cases of each step of the climb: one where only the climb has the study's own scale."""
+        return 1 if self.fidelity else self.climb.replicates
 
 
 TARGET_SCENE = "target"

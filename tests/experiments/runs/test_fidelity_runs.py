@@ -120,8 +120,8 @@ def test_the_design_is_simulated_at_the_cheaper_scale_and_the_report_says_so(
     code, _, said = dem_warp(*words)
     assert code == 0, said
     assert "The design at the scale soft, 12 runs" in " ".join(said.split())
-    # Three in the middle, twelve that move the surface, five that verify.
-    assert (scales[1.0], set(scales)) == (3 + 12 + 5, {1.0, 16.0})
+    # Six steps of the climb, six that move the surface, five that verify.
+    assert (scales[1.0], set(scales)) == (6 + 6 + 5, {1.0, 16.0})
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "The surface at this scale" in page
     card = tomllib.loads((out / "material.toml").read_text(encoding="utf-8"))

@@ -1,6 +1,7 @@
 """Surfaces of a cheaper scale that a few runs move: is the hidden setting in the compatible region."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -19,12 +20,13 @@ from doe import (
     spread_points,
     transfer,
 )
-from doe.design.design import natural_points
-from experiments.calibrate.fidelity_stage import LEAST
+from experiments.calibrate.fidelity_stage import further_runs
 from experiments.evidence.accuracy.statistics.coverage import EXACT, Figure, generator
+from experiments.studyfile.campaign import FidelitySettings
 
 TWINS, RESOLUTION = 500, {2: 40, 3: 11}  # of each case; cells along each factor
 CHEAP, OWN, MEASURED = 1.0, 0.7, 5  # standard deviations of a run at both scales; measurements of the target
+STEPS = np.linspace(-2.5, 2.5, 6)  # of the climb, in half-ranges of the strongest factor
 
 Cells = NDArray[np.float64]
 
@@ -42,10 +44,8 @@ def fidelity() -> Iterator[Figure]:
 def one(rng: Generator, count: int, runs: int, slope: float) -> tuple[bool, float, float] | None:
     """Draw a twin: is it inside, the share of the region, and that share with the whole design at its scale.
 
-    None where the surface of the cheaper scale shows no term.
+    None where the climb does not cross the target, or the hidden setting is outside the design.
     """
-    design = central_composite([Factor(name, 0.0, 1.0) for name in "EFG"[:count]], "rotatable", 6)
-    points = design.points.to_numpy()
     lines, bends = rng.normal([4.0, 0.0, 0.0][:count], 3.0), rng.normal(0.0, 0.5, (count, count))
     shift, scale, apart = rng.normal(0.0, 1.0), rng.normal(1.0, 0.15), rng.normal(0.0, slope, count)
 
@@ -55,34 +55,34 @@ def one(rng: Generator, count: int, runs: int, slope: float) -> tuple[bool, floa
     def own(x: Cells, noise: float = OWN) -> Cells:
         return shift + scale * cheap(x) + x @ apart + rng.normal(0.0, noise, len(x))
 
-    source = fit_surface(design, cheap(points) + rng.normal(0.0, CHEAP, len(points))).reduce()
-    if not source.terms:
-        return None
     hidden = rng.uniform(-1.0, 1.0, (1, count))
     target = Sample.of(own(np.repeat(hidden, MEASURED, axis=0)))
-    moved = moved_surface(design, source, target, own, runs)
-    values = zip(design.factors, hidden[0], strict=True)
-    natural = {factor.name: float(factor.to_natural(value)) for factor, value in values}
-    whole = fit_surface(design, own(points))
+    places = np.outer(STEPS, lines / np.abs(lines).max())
+    climbed = own(places)
+    error = climbed - target.mean
+    crossed = np.flatnonzero(error[:-1] * error[1:] <= 0.0)
+    if not len(crossed):
+        return None
+    first = crossed[0]
+    center = places[first] + error[first] / (error[first] - error[first + 1]) * (places[1] - places[0])
+    factors = [Factor.around(name, value, 1.0) for name, value in zip("EFG", center, strict=False)]
+    design = central_composite(factors, "rotatable", 6)
+    points = design.points.to_numpy()
+    source = fit_surface(design, cheap(points + center) + rng.normal(0.0, CHEAP, len(points)))
+    farthest = np.linalg.norm(points, axis=1).max() * (1.0 + 1e-9)
+    if np.linalg.norm(hidden - center) > farthest:
+        return None
+    near = np.linalg.norm(places - center, axis=1) <= farthest
+    level = float(source.evaluate(np.zeros((1, count)))[0][0])
+    cells = inside(source, replace(target, mean=level), design)
+    further = further_runs(FidelitySettings(scale="", runs=runs), len(STEPS), count)
+    fresh = spread_points(source, cells, further, places[near] - center)
+    table = pd.DataFrame(np.vstack([places[near], fresh + center]), columns=design.names)
+    moved = transfer(source, table, np.append(climbed[near], own(fresh + center)), target.mean, slopes=True)
+    natural = dict(zip(design.names, hidden[0].tolist(), strict=True))
+    whole = fit_surface(design, own(points + center))
     shares = [len(inside(fit, target, design)) for fit in (moved, whole)]
     return moved.agrees(natural, target), shares[0], max(shares[1], 1)
-
-
-def moved_surface(
-    design: Design, source: Surface, target: Sample, own: Callable[[Cells], Cells], runs: int
-) -> Transfer:
-    """Move a surface by runs in two rounds, as a campaign does."""
-    made, values = np.zeros((0, len(design.names))), np.zeros(0)
-    cells = inside(source, Sample(0.0, 1e6, 2), design)
-    first = max(runs // 2, LEAST + len(design.names))
-    for count in (first, runs - first):
-        points = spread_points(source, cells, count, made)
-        made, values = np.vstack([made, points]), np.append(values, own(points))
-        table = natural_points(design.factors, pd.DataFrame(made, columns=design.names))
-        moved = transfer(source, table, values, target.mean, slopes=True)
-        near = inside(moved, target, design)
-        cells = near if len(near) else cells
-    return moved
 
 
 def inside(fit: Surface | Transfer, target: Sample, design: Design) -> Cells:
