@@ -64,7 +64,7 @@ def angle(
             "frame), tables of spheres, VTK, extended XYZ, NumPy and MercuryDPM files; gzip is read.",
         ),
     ],
-    fit: Annotated[str, typer.Option(help="Part of the flanks: flank, middle, lower or upper.")] = "flank",
+    fit: Annotated[str, typer.Option(help="flank, trimmed, middle, lower or upper part.")] = "flank",
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Draw the fitted flanks on copies in this folder.")
     ] = None,

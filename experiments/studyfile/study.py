@@ -47,7 +47,7 @@ class MeasurementSection(Section):
     """``[measurement]``: the reading of an angle from a heap; only angles read the same way compare."""
 
     fit: str = "flank"
-    """Part of the flank that the line is fitted to: flank (all of it), middle, lower or upper."""
+    """Part of the flank that the line is fitted to: flank (all of it), trimmed, middle, lower or upper."""
     azimuths: int = Field(default=8, ge=2, le=360)
     """Views of one heap, over half a turn."""
     pixels: int = Field(default=800, ge=50, le=4000)

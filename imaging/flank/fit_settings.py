@@ -42,9 +42,11 @@ FITS = {
     settings.name: settings
     for settings in (
         FitSettings("flank", 0.0, 1.0),
+        FitSettings("trimmed", 0.1, 0.9),
         FitSettings("middle", 0.2, 0.8),
         FitSettings("lower", 0.0, 0.5),
         FitSettings("upper", 0.5, 1.0),
     )
 }
-"""Named fits: `flank` is the whole flank from base to apex, `middle` its 20 to 80 % of height."""
+"""Named fits: `flank` is the whole flank from base to apex, `trimmed` its 10 to 90 % of height, `middle` its
+20 to 80 %."""

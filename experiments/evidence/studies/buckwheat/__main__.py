@@ -14,7 +14,7 @@ import typer
 
 from experiments.calibrate.campaign import Campaign
 from experiments.commands.console import clear_errors
-from experiments.evidence.studies.buckwheat.records.paper_page import RECORD, draw_heaps, write_record
+from experiments.evidence.studies.buckwheat.records.paper_page import RECORD, write_record
 from experiments.evidence.studies.buckwheat.replay.replay import Replay
 from experiments.evidence.studies.buckwheat.replay.runs import STAGES, planned_cases
 from experiments.report.writer import library_versions
@@ -31,9 +31,8 @@ def replay_runs(run: Run, replicates: int) -> Replay:
 
 
 def record_runs(run: Run, replay: Replay, campaign: Campaign | None = None) -> Path:
-    """Write the page on the paper's runs, its tables and its picture; return the page."""
+    """Write the page on the paper's runs, and its tables; return the page."""
     with run.publishing() as drafts:
-        draw_heaps(drafts / RECORD, run.study, replay, run.store.load)
         page = write_record(drafts / RECORD, replay.cases, _provenance(run, replay), campaign)
     return run.folder / page.relative_to(drafts)
 

@@ -30,7 +30,6 @@ def test_each_stage_is_one_batch_and_the_page_compares_the_campaign(
         return table.assign(status="finished", reason="", angle=angle, **facts)
 
     monkeypatch.setattr(run_folder, "run_cases", run_cases)
-    monkeypatch.setattr(command, "draw_heaps", lambda *_: None)
     monkeypatch.setattr(calibration, "heap_pictures", lambda *_: ())
     monkeypatch.setattr(calibration, "verified_heap", lambda *_: None)
     out = tmp_path / "out"

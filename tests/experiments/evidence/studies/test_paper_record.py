@@ -11,9 +11,8 @@ from analytic_heaps import AnalyticHeaps, study_with
 from experiments.calibrate import Campaign, calibrate
 from experiments.evidence.studies.buckwheat.records import paper_page, paper_record
 from experiments.evidence.studies.buckwheat.replay.replay import Replay
-from experiments.evidence.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
+from experiments.evidence.studies.buckwheat.replay.replay_tables import replay_tables
 from experiments.evidence.studies.buckwheat.replay.runs import planned_cases
-from experiments.io.errors import InputError
 from experiments.report.material_card import CARD, write_material_card
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.card import read_card, with_material
@@ -86,35 +85,25 @@ def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaig
     assert f"Outcome: {campaign.outcome.value}. {campaign.reason}" in page
 
 
-def test_a_record_includes_a_card_scales_notes_and_side_studies(
+def test_a_record_includes_a_card_notes_and_side_studies(
     tmp_path: Path, campaign: Campaign, study: Study
 ) -> None:
-    bench, record = tmp_path / "bench", tmp_path / "record"
-    for folder, shift in ((tmp_path / "paper", 0.0), (bench, -4.0)):
-        paper_page.write_record(folder / "record", cases(shift), {"commit": None}, campaign)
+    record = tmp_path / "record"
+    paper_page.write_record(tmp_path / "paper" / "record", cases(), {"commit": None}, campaign)
     write_material_card(campaign, study, tmp_path / "paper")
     record.mkdir()
     (record / "notes.md").write_text("What we make of it.", encoding="utf-8")
     (record / "side_studies.md").write_text("## Another clump", encoding="utf-8")
-    paper_record.main(tmp_path / "paper", [f"bench={bench}"], "abc123", record)
+    paper_record.main(tmp_path / "paper", "abc123", record)
     page = (record / paper_page.PAGE).read_text(encoding="utf-8")
     assert "What we make of it." in page
     assert f"]({CARD})" in page
     clumps = [Path(read_card(folder / CARD)["grain"]["clump"]) for folder in (tmp_path / "paper", record)]
     assert clumps[1].read_bytes() == clumps[0].read_bytes()
     assert "- commit: abc123" in page
-    cost = paper_page.scale_cost(Replay(cases(-4.0)), Replay(cases()))
-    # The same noise in both: the difference is the shift.
-    assert cost.bias.value == pytest.approx(-4.0)
-    assert numbers_of(page, "What a smaller scale costs")[0][4] == "−4.00"
     assert "## Another clump" in page
-    paper_record.main(None, None, None, record)
+    paper_record.main(None, None, record)
     assert (record / paper_page.PAGE).read_text(encoding="utf-8") == page
-
-
-def test_a_folder_without_the_papers_runs_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f"{paper_page.RUNS}: no such file"):
-        paper_record.gather_scale("bench", tmp_path, tmp_path / "record")
 
 
 def test_a_record_of_few_angles_says_what_can_be_said() -> None:
@@ -128,9 +117,3 @@ def test_a_record_of_few_angles_says_what_can_be_said() -> None:
         ["Table 5, steepest climb", "6"],
     ]
     assert "## Response surface" not in page
-
-
-def test_the_ranking_is_said_in_words() -> None:
-    sentence = ranking_sentence(Replay(cases()))
-    assert sentence.startswith("The two strongest factors of the screening are F and E here (F +14.")
-    assert sentence.endswith("F and E in the paper.")

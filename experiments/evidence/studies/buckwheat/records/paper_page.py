@@ -3,40 +3,31 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from dem_warp import CaseResult
-from doe import Agreement, agreement
 from doe.plots import agreement_plot
 from experiments.calibrate.campaign import Campaign
 from experiments.evidence.page_figures import save_figure
 from experiments.evidence.record_page import facts_list, markdown_page, markdown_table, wall_times_table
-from experiments.evidence.studies.buckwheat.records.heap_row import heap_row
-from experiments.evidence.studies.buckwheat.replay.replay import RUN, Replay
-from experiments.evidence.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
+from experiments.evidence.studies.buckwheat.replay.replay import Replay
+from experiments.evidence.studies.buckwheat.replay.replay_tables import replay_tables
 from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, TABLES
-from experiments.io.files import replacing, write_text
+from experiments.io.files import write_text
 from experiments.io.plain_data import jsonable
-from experiments.report.kit.table import Column, Layout, Table, columns, make_table
+from experiments.report.kit.table import Table
 from experiments.report.material_card import CARD
-from experiments.studyfile import Study
-from imaging import save_picture
 
 PAGE, RUNS, PROVENANCE, CAMPAIGN = "README.md", "runs.csv", "provenance.json", "campaign.json"
 RECORD = "record"
 """Folder of the page in that of the runs."""
-HEAPS, SCATTER, NOTES = "heaps.png", "agreement.png", "notes.md"
+SCATTER, NOTES = "agreement.png", "notes.md"
 SIDE_STUDIES = "side_studies.md"
 """Chapters on variants of the model and on other bases, as the code of commit e6d63b6a wrote them."""
-
-SHOWN = {"Screening 3": ("screening", 3), "Screening 12": ("screening", 12), "Optimum": ("verification", 1)}
-"""Runs in the picture of heaps."""
-HEAPS_TITLE = "Screening run 3, screening run 12 and the published optimum, at one scale"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +42,6 @@ class Record:
     """Campaign of our own: outcome, reason, effects of its screening."""
     card: bool = False
     """There is a card of the material that it chose."""
-    scales: Mapping[str, Replay] = field(default_factory=dict)
-    """The same runs at smaller scales, by name."""
-    picture: bool = False
-    """There is a picture of heaps."""
     notes: str = ""
     """A person's reading of the numbers, Markdown."""
     side_studies: str = ""
@@ -64,14 +51,11 @@ class Record:
     def read(cls, folder: Path) -> Record:
         """Read the tables of a record; a folder that holds none raises `FileNotFoundError`."""
         campaign = folder / CAMPAIGN
-        scales = {path.stem.removeprefix("runs-"): path for path in sorted(folder.glob("runs-*.csv"))}
         return cls(
             Replay(pd.read_csv(folder / RUNS)),
             json.loads((folder / PROVENANCE).read_text(encoding="utf-8")),
             json.loads(campaign.read_text(encoding="utf-8")) if campaign.is_file() else None,
             (folder / CARD).is_file(),
-            {name: Replay(pd.read_csv(path)) for name, path in scales.items()},
-            (folder / HEAPS).is_file(),
             *(
                 path.read_text(encoding="utf-8") if path.is_file() else ""
                 for path in (folder / NOTES, folder / SIDE_STUDIES)
@@ -84,34 +68,13 @@ def write_record(
 ) -> Path:
     """Write the tables of a record, and its page; return the page.
 
-    Its cases are the paper's runs simulated again; the campaign is our own. What is in
-    the folder of a picture, of other scales or of sensitivities is taken in.
+    Its cases are the paper's runs simulated again; the campaign is our own. Notes in the folder are taken in.
     """
     write_text(folder / RUNS, cases.to_csv(index=False))
     write_text(folder / PROVENANCE, _json(provenance))
     if campaign is not None:
         write_text(folder / CAMPAIGN, _json(campaign_facts(campaign)))
     return write_record_page(folder)
-
-
-def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str], CaseResult]) -> None:
-    """Draw the first heaps of three runs next to each other, those that were measured.
-
-    `load` finds the result of a case by its ``case_key``, as ``Store.load`` does.
-    """
-    cases = replay.measured
-    shown = {}
-    for title, (stage, run) in SHOWN.items():
-        found = cases[(cases["stage"] == stage) & (cases["run"] == run)]
-        if found.empty:
-            continue
-        published = replay.runs.set_index(RUN)["published"][stage, run]
-        first = found.iloc[0]
-        shown[f"{title}: {first['angle']:.1f} deg, published {published:.1f}"] = load(str(first["case_key"]))
-    if not shown:
-        return
-    with replacing(folder / HEAPS) as temporary:
-        save_picture(temporary, heap_row(study, shown))
 
 
 def write_record_page(folder: Path) -> Path:
@@ -155,14 +118,11 @@ def record_page(record: Record) -> str:
         markdown_table(tables["agreement"]),
         f"![Simulated against published angles]({SCATTER})",
         record.notes,
-        *(["## Heaps", f"![{HEAPS_TITLE}]({HEAPS})"] if record.picture else []),
         *_section("Screening", tables, "effects"),
-        *([ranking_sentence(record.replay)] if "effects" in tables else []),
         *_section("Response surface", tables, "anova", "coefficients"),
         *_section("Where the friction of steel acts", tables, "course", "slopes"),
         *_section("Verification", tables, "verification"),
         *_campaign(record),
-        *_scales(record),
         record.side_studies,
         "## Every run",
         markdown_table(tables["runs"]),
@@ -181,37 +141,6 @@ def _campaign(record: Record) -> list[str]:
     outcome = f"Outcome: {record.campaign['outcome']}. {record.campaign['reason']}"
     card = f"The material, and all settings that are as good: [{CARD}]({CARD})." if record.card else ""
     return ["## Our own campaign", outcome, card]
-
-
-def scale_cost(small: Replay, full: Replay) -> Agreement:
-    """Angles of the 31 runs at a smaller scale against those at full scale, run by run."""
-    pair = full.runs.set_index(RUN).join(small.runs.set_index(RUN)[["angle", "n"]].add_prefix("small_"))
-    pair = pair[pair.index.get_level_values("stage").isin(DESIGNS)].dropna(subset=["angle", "small_angle"])
-    stage = pair.index.get_level_values("stage")
-    noise = pd.Series(stage.map(small.heap_variance), pair.index) / pair["small_n"]
-    reference = pd.Series(stage.map(full.heap_variance), pair.index) / pair["n"]
-    return agreement(pair["small_angle"], pair["angle"], noise, float(reference.mean()), strata=stage)
-
-
-def _scales(record: Record) -> list[str]:
-    if not record.scales:
-        return []
-    rows = []
-    for name, replay in record.scales.items():
-        cost = scale_cost(replay, record.replay)
-        estimates = ("rmse", "rmse_without_noise", "bias", "slope", "spearman")
-        row = {"scale": name, "runs": cost.runs, "published": replay.agreement().rmse.value}
-        rows.append(row | {estimate: getattr(cost, estimate).value for estimate in estimates})
-    shown: Layout = [
-        "scale",
-        Column("runs", "runs", "label"),
-        *columns("angle", "°", rmse="rmse against full scale", rmse_without_noise="noise of both out"),
-        *columns("angle", "°", bias="bias"),
-        *columns("ratio", slope="slope", spearman="Spearman"),
-        *columns("angle", "°", published="rmse against the paper"),
-    ]
-    table = make_table("scales", pd.DataFrame(rows), shown, "The 31 runs at smaller scales.")
-    return ["## What a smaller scale costs", markdown_table(table)]
 
 
 def _json(value: Mapping[str, Any]) -> str:

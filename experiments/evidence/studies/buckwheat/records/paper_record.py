@@ -1,9 +1,7 @@
 r"""The record of the paper's runs: gathered from the folders that made it, its page written anew.
 
     python -m experiments.evidence.studies.buckwheat --campaign --scale paper --out out/paper
-    python -m experiments.evidence.studies.buckwheat --scale bench --out out/bench
-    python -m experiments.evidence.studies.buckwheat.records.paper_record --paper out/paper \
-        --smaller bench=out/bench
+    python -m experiments.evidence.studies.buckwheat.records.paper_record --paper out/paper
 
 Without a folder it writes the page again from the tables of the record. The record lies in
 ``experiments/evidence/studies/buckwheat/record``.
@@ -17,7 +15,6 @@ import typer
 
 from experiments.evidence.studies.buckwheat.records.paper_page import (
     CAMPAIGN,
-    HEAPS,
     PROVENANCE,
     RECORD,
     RUNS,
@@ -36,9 +33,8 @@ def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
     """
     for name in (RUNS, PROVENANCE):
         copy_file(source / RECORD / name, record / name)
-    for name in (CAMPAIGN, HEAPS):
-        if (source / RECORD / name).is_file():
-            copy_file(source / RECORD / name, record / name)
+    if (source / RECORD / CAMPAIGN).is_file():
+        copy_file(source / RECORD / CAMPAIGN, record / CAMPAIGN)
     # the card of the campaign with its clumps
     for path in source.glob(f"{Path(CARD).stem}*"):
         copy_file(path, record / path.name)
@@ -47,17 +43,9 @@ def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
         write_text(record / PROVENANCE, json.dumps(made_by | {"commit": commit}, indent=1) + "\n")
 
 
-def gather_scale(name: str, source: Path, record: Path) -> None:
-    """Take over the paper's runs at a smaller scale."""
-    copy_file(source / RECORD / RUNS, record / f"runs-{name}.csv")
-
-
 def main(
     paper_folder: Annotated[
         Path | None, typer.Option("--paper", help="Folder of a calibration with the paper's runs.")
-    ] = None,
-    smaller: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=FOLDER", help="The same at a smaller scale.")
     ] = None,
     commit: Annotated[str | None, typer.Option(help="Commit that made the paper's runs.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the record.")] = FOLDER,
@@ -65,9 +53,6 @@ def main(
     """Gather the record and write its page."""
     if paper_folder:
         gather_paper(paper_folder, out, commit)
-    for text in smaller or []:
-        name, _, source = text.partition("=")
-        gather_scale(name, Path(source), out)
     print(write_record_page(out))
 
 

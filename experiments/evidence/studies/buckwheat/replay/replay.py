@@ -201,16 +201,6 @@ class Replay:
             found.append(stage)
         return frozenset(found)
 
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Tables for CSV files, by name."""
-        tables = {"paper_cases": self.cases, "paper_runs": self.runs}
-        tables["paper_agreement"] = self.agreement_table.reset_index()
-        if "screening" in self.analysed:
-            tables["paper_effects"] = self.effects.reset_index()
-        if "composite" in self.analysed:
-            tables["paper_anova"] = self.anova.reset_index()
-        return tables
-
     def _of(self, stage: str) -> pd.DataFrame:
         return self.measured[self.measured["stage"] == stage]
 

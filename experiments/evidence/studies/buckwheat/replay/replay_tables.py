@@ -4,7 +4,7 @@ import pandas as pd
 
 from experiments.evidence.studies.buckwheat.replay.replay import COURSE, Replay, published_noise
 from experiments.evidence.studies.buckwheat.replay.runs import TABLES
-from experiments.report.kit.numbers import estimate, fixed, p_clause
+from experiments.report.kit.numbers import estimate, fixed
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.report.stage_tables import comparison_facts, p_marks
 
@@ -169,16 +169,3 @@ def slopes_table(replay: Replay) -> Table:
     shown: Layout = ["observable", *columns("ratio", E="a step of E", E_t=error, F="a step of F", F_t=error)]
     note = "Planes by least squares through all heaps of Table 6; a step is one coded unit."
     return make_table("replay-slopes", frame, shown, "Slopes over Table 6.", note)
-
-
-def ranking_sentence(replay: Replay) -> str:
-    """Say which factors move the angle most, here and in the paper."""
-    table = replay.effects
-    ours, theirs = (table.sort_values(column).index[:2] for column in ("rank", "paper_rank"))
-    values = ", ".join(
-        f"{name} {table['effect'][name]:+.1f}° (p {p_clause(table['p'][name])})" for name in ours
-    )
-    return (
-        f"The two strongest factors of the screening are {' and '.join(ours)} here ({values}), "
-        f"{' and '.join(theirs)} in the paper."
-    )
