@@ -47,10 +47,8 @@ def simulate(
 ) -> None:
     """Simulate and read the heaps that the folder lacks."""
     with clear_errors("What is stored is not simulated again."):
-        for name in base or BASES:
-            if name not in BASES:
-                problem = f"must name a base, {nearest_name(name, list(BASES))}"
-                raise InputError("--base", problem, name)
+        for name in set(base or ()) - set(BASES):
+            raise InputError("--base", f"must name a base, {nearest_name(name, list(BASES))}", name)
         for name in base or BASES:
             table = simulate_base(name, out, replicates, scale, modulus_scale, OwnWorkers(device, workers))
             print(f"{name}: {table['flank'].notna().sum()} of {len(table)} heaps have an angle", flush=True)

@@ -9,13 +9,12 @@ import pytest
 from analytic_heaps import AnalyticHeaps, study_with
 
 from experiments.calibrate import Campaign, calibrate
-from experiments.evidence.studies.buckwheat.records import paper_page, paper_record
+from experiments.evidence.studies.buckwheat.records import paper_page
 from experiments.evidence.studies.buckwheat.replay.replay import Replay
-from experiments.evidence.studies.buckwheat.replay.replay_tables import replay_tables
 from experiments.evidence.studies.buckwheat.replay.runs import planned_cases
-from experiments.report.material_card import CARD, write_material_card
+from experiments.report.material_card import CARD
 from experiments.studyfile import Study, load_study
-from experiments.studyfile.card import read_card, with_material
+from experiments.studyfile.card import with_material
 
 WALL_TIMES = [{"stage": "paper, climb", "simulated": 6, "seconds": 44.7}]
 
@@ -23,7 +22,8 @@ WALL_TIMES = [{"stage": "paper, climb", "simulated": 6, "seconds": 44.7}]
 def cases(shift: float = 0.0, replicates: int = 2) -> pd.DataFrame:
     plan = planned_cases(replicates)
     noise = 0.3 * np.random.default_rng(5).standard_normal(len(plan))
-    return plan.assign(status="finished", reason="", angle=plan["published"] + shift + noise)
+    seen = {"centre_height": 0.009, "rolled_fraction": 0.2, "wall_drag": 0.4}
+    return plan.assign(status="finished", reason="", angle=plan["published"] + shift + noise, **seen)
 
 
 def numbers_of(page: str, heading: str) -> list[list[str]]:
@@ -47,22 +47,22 @@ def campaign(study: Study) -> Campaign:
 @pytest.fixture(scope="module")
 def committed() -> paper_page.Record:
     """Return the record in the tree."""
-    return paper_page.Record.read(paper_record.FOLDER)
+    return paper_page.Record.read(paper_page.FOLDER)
 
 
 def test_the_committed_page_follows_from_the_committed_angles(committed: paper_page.Record) -> None:
-    page = (paper_record.FOLDER / paper_page.PAGE).read_text(encoding="utf-8")
+    page = (paper_page.FOLDER / paper_page.PAGE).read_text(encoding="utf-8")
     assert page == paper_page.record_page(committed)
 
 
 def test_the_committed_card_is_that_of_the_committed_campaign(committed: paper_page.Record) -> None:
-    card = tomllib.loads((paper_record.FOLDER / CARD).read_text(encoding="utf-8"))
+    card = tomllib.loads((paper_page.FOLDER / CARD).read_text(encoding="utf-8"))
     campaign = committed.campaign
     assert campaign is not None
     assert (card["fitted"]["outcome"], card["fitted"]["reason"]) == (campaign["outcome"], campaign["reason"])
     study = load_study(None, "paper")
     case = study.case({name: factor["chosen"] for name, factor in card["factor"].items()}, 1)
-    own = with_material({"material": CARD}, paper_record.FOLDER)
+    own = with_material({"material": CARD}, paper_page.FOLDER)
     assert own["grain"]["density"] == "698 kg/m^3"
     friction = own["contact"]["grain-wall"]["static_friction"]
     # The card has the chosen point in full, the table of its factors four figures of it.
@@ -85,35 +85,10 @@ def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaig
     assert f"Outcome: {campaign.outcome.value}. {campaign.reason}" in page
 
 
-def test_a_record_includes_a_card_notes_and_side_studies(
-    tmp_path: Path, campaign: Campaign, study: Study
-) -> None:
-    record = tmp_path / "record"
-    paper_page.write_record(tmp_path / "paper" / "record", cases(), {"commit": None}, campaign)
-    write_material_card(campaign, study, tmp_path / "paper")
-    record.mkdir()
-    (record / "notes.md").write_text("What we make of it.", encoding="utf-8")
-    (record / "side_studies.md").write_text("## Another clump", encoding="utf-8")
-    paper_record.main(tmp_path / "paper", "abc123", record)
-    page = (record / paper_page.PAGE).read_text(encoding="utf-8")
-    assert "What we make of it." in page
-    assert f"]({CARD})" in page
-    clumps = [Path(read_card(folder / CARD)["grain"]["clump"]) for folder in (tmp_path / "paper", record)]
-    assert clumps[1].read_bytes() == clumps[0].read_bytes()
-    assert "- commit: abc123" in page
-    assert "## Another clump" in page
-    paper_record.main(None, None, record)
-    assert (record / paper_page.PAGE).read_text(encoding="utf-8") == page
-
-
-def test_a_record_of_few_angles_says_what_can_be_said() -> None:
-    some = cases().assign(status="diverged")
-    some.loc[some["stage"] != "climb", "angle"] = np.nan
-    some.loc[:5, "angle"] = 20.0  # three screening runs
-    assert set(replay_tables(Replay(some))) == {"agreement", "runs"}
-    page = paper_page.record_page(paper_page.Record(Replay(some), {}))
-    assert [row[:2] for row in numbers_of(page, "Agreement")][:2] == [
-        ["Table 3, Plackett-Burman screening", "3"],
-        ["Table 5, steepest climb", "6"],
-    ]
-    assert "## Response surface" not in page
+def test_a_record_includes_a_card_notes_and_side_studies(tmp_path: Path, campaign: Campaign) -> None:
+    paper_page.write_record(tmp_path, cases(), {"commit": "abc123"}, campaign)
+    for name, text in ((CARD, ""), ("notes.md", "What we make of it."), ("side_studies.md", "## A clump")):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    page = paper_page.write_record_page(tmp_path).read_text(encoding="utf-8")
+    for text in ("What we make of it.", f"]({CARD})", "- commit: abc123", "## A clump"):
+        assert text in page

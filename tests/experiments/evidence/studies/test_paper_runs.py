@@ -98,10 +98,6 @@ def test_what_steel_does_is_a_mean_along_the_climb_and_a_plane_over_the_composit
     assert replay.course["wall_drag"].tolist() == pytest.approx(40.0 + 5.0 * (climb["F"] - 0.45) / 0.1)
 
 
-def test_without_observables_of_the_flow_there_is_no_word_of_it(perfect: Replay) -> None:
-    assert "course" not in perfect.analysed
-
-
 def test_the_papers_own_noise_is_that_of_its_replicates() -> None:
     # The pure error of the five composite centres; the standard deviation of 30.121, 31.574 and 29.283.
     assert published_noise() == pytest.approx((math.sqrt(0.298741), 1.159176), rel=1e-6)

@@ -1,4 +1,7 @@
-"""The record of the paper's runs simulated again: a folder whose page is made from its tables."""
+"""The record of the paper's runs simulated again: a folder whose page is made from its tables.
+
+This module as a command writes the page in the tree anew.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +22,12 @@ from experiments.evidence.studies.buckwheat.replay.replay_tables import replay_t
 from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, TABLES
 from experiments.io.files import write_text
 from experiments.io.plain_data import jsonable
-from experiments.report.kit.table import Table
 from experiments.report.material_card import CARD
 
 PAGE, RUNS, PROVENANCE, CAMPAIGN = "README.md", "runs.csv", "provenance.json", "campaign.json"
 RECORD = "record"
 """Folder of the page in that of the runs."""
+FOLDER = Path(__file__).parents[1] / RECORD
 SCATTER, NOTES = "agreement.png", "notes.md"
 SIDE_STUDIES = "side_studies.md"
 """Chapters on variants of the model and on other bases, as the code of commit e6d63b6a wrote them."""
@@ -106,33 +109,35 @@ def campaign_effects(campaign: Mapping[str, Any] | None) -> pd.DataFrame | None:
 
 def record_page(record: Record) -> str:
     """Write the page as Markdown."""
-    tables = replay_tables(record.replay, campaign_effects(record.campaign))
+    laid_out = replay_tables(record.replay, campaign_effects(record.campaign))
+    tables = {name: markdown_table(table) for name, table in laid_out.items()}
     return markdown_page(
         "# The paper's runs, simulated again",
         "Every run of Tables 3, 5 and 6 of the paper and its verification, with the published angles. This "
         "page is made from the files next to it: "
-        "`python -m experiments.evidence.studies.buckwheat.records.paper_record --help`.",
+        "`python -m experiments.evidence.studies.buckwheat.records.paper_page`.",
         facts_list(record.provenance),
         wall_times_table(record.provenance, "heaps"),
         "## Agreement",
-        markdown_table(tables["agreement"]),
+        tables["agreement"],
         f"![Simulated against published angles]({SCATTER})",
         record.notes,
-        *_section("Screening", tables, "effects"),
-        *_section("Response surface", tables, "anova", "coefficients"),
-        *_section("Where the friction of steel acts", tables, "course", "slopes"),
-        *_section("Verification", tables, "verification"),
+        "## Screening",
+        tables["effects"],
+        "## Response surface",
+        tables["anova"],
+        tables["coefficients"],
+        "## Where the friction of steel acts",
+        tables["course"],
+        tables["slopes"],
+        "## Verification",
+        tables["verification"],
         *_campaign(record),
         record.side_studies,
         "## Every run",
-        markdown_table(tables["runs"]),
+        tables["runs"],
         f"Every heap, with its seed, stands in [{RUNS}]({RUNS}).",
     )
-
-
-def _section(title: str, tables: Mapping[str, Table], *names: str) -> list[str]:
-    found = [markdown_table(tables[name]) for name in names if name in tables]
-    return [f"## {title}", *found] if found else []
 
 
 def _campaign(record: Record) -> list[str]:
@@ -145,3 +150,7 @@ def _campaign(record: Record) -> list[str]:
 
 def _json(value: Mapping[str, Any]) -> str:
     return json.dumps(jsonable(value), indent=1, allow_nan=False) + "\n"
+
+
+if __name__ == "__main__":
+    print(write_record_page(FOLDER))

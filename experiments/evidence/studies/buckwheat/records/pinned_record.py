@@ -1,6 +1,5 @@
 """The README's campaign over many seeds."""
 
-import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,8 +9,7 @@ import typer
 from experiments.calibrate import calibrate
 from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.evidence.record_page import markdown_table, write_page
-from experiments.io.files import copy_file, write_text
-from experiments.studyfile import BUCKWHEAT, load_study
+from experiments.studyfile import load_study
 
 SCALE = "bench"
 FOLDER = Path(__file__).parents[1] / "point"
@@ -20,18 +18,11 @@ MADE = "27 November 2026, on an H200, with readings of E and F; the study now re
 ASKED = {"E": 15.0, "F": 15.0, "G": 30.0}
 """Half of each factor's interval over its value, at most [%]."""
 
-SEEDS = re.compile(r"(?<=^\[campaign.seeds\]\n)campaign = \d+\ntarget = \d+$", re.MULTILINE)
-
 
 def one_campaign(seed: int, folder: Path, device: str) -> dict[str, Any]:
     """Run the campaign with other seeds, those of the target and of its readings too; return a row."""
-    text, found = SEEDS.subn(f"campaign = {2 * seed - 1}\ntarget = {2 * seed}", BUCKWHEAT.read_text("utf-8"))
-    if found != 1:
-        raise ValueError(f"{BUCKWHEAT}: expected one [campaign.seeds]")
-    folder.mkdir(parents=True, exist_ok=True)
-    copy_file(BUCKWHEAT.with_name("clump.txt"), folder / "clump.txt")
-    write_text(folder / "study.toml", text)
-    study, store = load_study(folder / "study.toml", SCALE), Store(folder / "cases")
+    seeds = {"campaign": {"seeds": {"campaign": 2 * seed - 1, "target": 2 * seed}}}
+    study, store = load_study(None, SCALE, seeds), Store(folder / "cases")
     workers = OwnWorkers(device=device)
     campaign = calibrate(study, lambda table: run_cases(study, table, store, workers))
     row: dict[str, Any] = {"seed": seed, "outcome": campaign.outcome.value}

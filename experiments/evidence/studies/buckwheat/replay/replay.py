@@ -1,6 +1,6 @@
 """The paper's runs simulated again, analysed as the paper analyses its own, and held against them."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +12,6 @@ from statsmodels.tools import add_constant
 from doe import (
     Agreement,
     Comparison,
-    DesignError,
     ErrorTerm,
     Sample,
     ScreenResult,
@@ -33,9 +32,6 @@ ALL = "Tables 3, 5 and 6"
 """The 31 runs of all designs together."""
 
 
-LEAST_RUNS = 3
-"""Agreement is not spoken of for fewer runs."""
-
 COURSE = {
     "angle": ("angle [°]", 1.0),
     "centre_height": ("height of the centre of mass [mm]", 1e3),
@@ -52,7 +48,7 @@ class Replay:
 
     cases: pd.DataFrame
     """A row a case: stage, run, replicate, angle [deg]; failed ones have no angle. Of further columns only
-    `COURSE` is read, where it is there."""
+    `COURSE` is read."""
 
     @cached_property
     def measured(self) -> pd.DataFrame:
@@ -107,11 +103,7 @@ class Replay:
     @cached_property
     def agreement_table(self) -> pd.DataFrame:
         """Agreement by table and in all; every estimate with the ends of its 95 % interval."""
-        measured = self.runs.dropna(subset=["angle"])["stage"].value_counts()
-        groups: dict[str, tuple[str, ...]] = {
-            STAGES[stage]: (stage,) for stage in STAGES if measured.get(stage, 0) >= LEAST_RUNS
-        }
-        groups |= {ALL: DESIGNS} if set(DESIGNS) <= set(measured.index) else {}
+        groups = {title: (stage,) for stage, title in STAGES.items()} | {ALL: DESIGNS}
         rows = {name: self._agreement_row(stages) for name, stages in groups.items()}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("table")
 
@@ -182,24 +174,6 @@ class Replay:
         if len(ours) >= 2:
             found["simulated again"] = compare_means(ours, target, margin=2.0 * target.sd)
         return found
-
-    @cached_property
-    def analysed(self) -> frozenset[str]:
-        """Stages of which enough cases gave an angle for their analysis, and ``course`` where it is known."""
-        analyses: dict[str, Callable[[], object]] = {
-            "screening": lambda: self.effects,
-            "composite": lambda: self.anova,
-            "verification": lambda: self.verification["simulated again"],
-            "course": lambda: (self.course, self.slopes),
-        }
-        found = []
-        for stage, analyse in analyses.items():
-            try:
-                analyse()
-            except (DesignError, KeyError):
-                continue
-            found.append(stage)
-        return frozenset(found)
 
     def _of(self, stage: str) -> pd.DataFrame:
         return self.measured[self.measured["stage"] == stage]

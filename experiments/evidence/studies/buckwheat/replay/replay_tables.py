@@ -20,18 +20,16 @@ def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[
 
     Effects of a campaign of our own by factor (effect, p, rank) are compared with those at the paper's runs.
     """
-    tables = {"agreement": agreement_table(replay)}
-    if "screening" in replay.analysed:
-        tables["effects"] = replay_effects_table(replay, campaign)
-    if "composite" in replay.analysed:
-        tables["anova"] = replay_anova_table(replay)
-        tables["coefficients"] = replay_coefficients_table(replay)
-    if "verification" in replay.analysed:
-        tables["verification"] = replay_verification_table(replay)
-    if "course" in replay.analysed:
-        tables["course"] = course_table(replay)
-        tables["slopes"] = slopes_table(replay)
-    return tables | {"runs": runs_table(replay)}
+    return {
+        "agreement": agreement_table(replay),
+        "effects": replay_effects_table(replay, campaign),
+        "anova": replay_anova_table(replay),
+        "coefficients": replay_coefficients_table(replay),
+        "course": course_table(replay),
+        "slopes": slopes_table(replay),
+        "verification": replay_verification_table(replay),
+        "runs": runs_table(replay),
+    }
 
 
 def agreement_table(replay: Replay) -> Table:
