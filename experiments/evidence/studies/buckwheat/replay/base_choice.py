@@ -76,7 +76,7 @@ class BaseChoice:
 
     @cached_property
     def left_out(self) -> dict[str, Candidate]:
-        """By the table that is left out: the choice of the other two."""
+        """Choice of the other two tables, by the one that is left out."""
         return {out: self.best([each for each in DESIGNS if each != out]) for out in DESIGNS}
 
 
