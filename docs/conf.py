@@ -14,8 +14,8 @@ ROOT = Path(__file__).parents[1]
 GENERATED = Path(__file__).parent / "generated"
 SHOWN = GENERATED / "shown"
 sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
-# Pages run in folders of their own: their commands are those of this tree, or of the packages in
-# PAGES_PYTHONPATH.
+# Pages run in folders of their own: their commands are those of this environment and tree; with an empty
+# PAGES_PYTHONPATH, those of what is installed.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 os.environ["PYTHONPATH"] = os.environ.get("PAGES_PYTHONPATH", str(ROOT))
 os.environ["DEM_WARP"] = str(ROOT)

@@ -19,7 +19,7 @@ from typing import Any
 DOCS = Path(__file__).parent
 RECORD = DOCS / "executed.csv"
 COLUMNS = ("page", "seconds", "cells", "commit", "date")
-QUICK = 20.0
+QUICK = 10.0
 """Longest time [s] of a page that the gate runs itself."""
 
 
