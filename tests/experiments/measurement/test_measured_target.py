@@ -187,7 +187,7 @@ def test_a_file_measured_under_held_out_conditions_alone_leads_nowhere(from_sour
     ("source", "place", "rule"),
     [
         (f'{NUMBERS}fit = "middle"', "target.fit", "the fit of the study"),
-        (f'{NUMBERS}fit = "midle"', "target.fit", "must be one of flank, middle"),
+        (f'{NUMBERS}fit = "midle"', "target.fit", "must be one of flank, trimmed, middle"),
         ('pictures = "photos"', "target.pictures", "at least two pictures"),
         ('file = "none.csv"', "none.csv", "file"),
         (f'{NUMBERS}pictures = "a"', "target.pictures", "only one of these"),

@@ -213,7 +213,7 @@ HOSTILE = {
     "no picture": Hostile("angle p.jpg", ("p.jpg: no such file",)),
     "text as a picture": Hostile("angle p.jpg", ("p.jpg", "is text", "neither a picture"),
                                  {"p.jpg": "hello\n"}),
-    "unknown fit": picture("--fit wide", "fit", "flank, middle", "wide"),
+    "unknown fit": picture("--fit wide", "fit", "flank, trimmed, middle", "wide"),
     "one sphere as a heap": Hostile(
         "angle h.csv", ("h.csv", "at least", "1"), {"h.csv": "x,y,z,r\n0,0,1,1\n"}
     ),

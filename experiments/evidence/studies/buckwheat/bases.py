@@ -2,7 +2,7 @@
 
     python -m experiments.evidence.studies.buckwheat.bases simulate --out out/bases --device cuda:0
     python -m experiments.evidence.studies.buckwheat.bases choose --phase 1 --out out/bases
-    python -m experiments.evidence.studies.buckwheat.bases page --out out/bases
+    python -m experiments.evidence.studies.buckwheat.bases page --out out/bases --made "DATE, MACHINE"
 
 `simulate` goes on where it was stopped; several may work in one folder, each with bases of its own. `choose`
 prints the choice, with --phase 1 the bases of which --replicates 3 are wanted. `page` keeps the record.
@@ -67,6 +67,23 @@ def choose(
         else:
             best = second_phase(heaps).best()
             print(best.base, best.estimator)
+
+
+@app.command()
+def page(
+    made: Annotated[str, typer.Option(help="Date, machine and wall time, for the page.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of new heaps. Default: those of the record.")
+    ] = None,
+) -> None:
+    """Keep the heaps in the record and write its page."""
+    # loads matplotlib, which a machine that simulates may lack
+    from experiments.evidence.studies.buckwheat.records.base_page import keep_heaps, write_base_page
+
+    with clear_errors():
+        if out is not None:
+            keep_heaps(read_heaps(out))
+        print(write_base_page(made))
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import pytest
 from dem_warp import Case, CaseResult
 from experiments.cases import OwnWorkers, Store
 from experiments.cases.workers import own
+from experiments.evidence.studies.buckwheat.records import base_page
 from experiments.evidence.studies.buckwheat.replay import base_heaps
 from experiments.evidence.studies.buckwheat.replay.base_choice import (
     GO_ON,
@@ -30,6 +31,7 @@ from experiments.evidence.studies.buckwheat.replay.base_heaps import (
     read_heap,
     simulate_base,
 )
+from experiments.evidence.studies.buckwheat.replay.replay import Replay
 from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, planned_cases
 from experiments.io.errors import InputError
 from experiments.studyfile import load_study
@@ -157,3 +159,18 @@ def test_a_failed_case_has_no_angle_and_its_reason(cone: Callable[..., CaseResul
     found = read_heap(store, load_study().measurement, "lost")
     assert {found[name] for name in ESTIMATORS} == {None}
     assert found["reason"] == "a grain left the world"
+
+
+def test_the_page_says_which_aims_are_met_and_what_is_reproduced(heaps: pd.DataFrame, tmp_path: Path) -> None:
+    base_page.keep_heaps(heaps, tmp_path)
+    shipped = heaps[heaps["base"] == TRUTH[0]].assign(angle=lambda rows: 40.0 - rows[TRUTH[1]])
+    shipped.to_csv(tmp_path / base_page.RUNS, index=False)
+    text = base_page.write_base_page("Made up.", tmp_path).read_text("utf-8")
+    assert f"Chosen: **{TRUTH[0]}**, read by **{TRUTH[1]}**" in text
+    met = [line.split("|")[4].strip() for line in text.split("## What")[0].splitlines() if "|" in line]
+    assert met == ["met", "---", *["yes"] * 5]
+    found = base_page.findings_table({"turned": Replay(shipped)}).set_index("finding")
+    # The paper's own conclusions; angles that are turned round have every one of them reversed.
+    assert found.loc["Table 3, two strongest factors", "published"] == "F, E"
+    assert found.loc["Table 6, coefficient of F [°]", "published"] == "1.12"
+    assert (found["reproduced"] == "no").sum() == len(found) - 1

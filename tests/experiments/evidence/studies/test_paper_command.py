@@ -27,7 +27,6 @@ def test_each_stage_is_one_batch_and_the_page_compares_the_campaign(
         batches.append(table["stage"].unique().tolist())
         angle = table["published"] if "published" in table else table.apply(plane, axis=1)
         facts = {"grain_count": 400.0, "simulated_time": 2.0, "case_key": "none"}
-        facts |= {"centre_height": 0.009, "rolled_fraction": 0.2, "wall_drag": 0.4}
         return table.assign(status="finished", reason="", angle=angle, **facts)
 
     monkeypatch.setattr(run_folder, "run_cases", run_cases)

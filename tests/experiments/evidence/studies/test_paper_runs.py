@@ -82,22 +82,6 @@ def test_a_perfect_simulator_agrees_and_has_the_papers_analysis(perfect: Replay)
     assert perfect.verification["simulated again"] == perfect.verification["the paper"]
 
 
-def test_what_steel_does_is_a_mean_along_the_climb_and_a_plane_over_the_composite_design() -> None:
-    plan = planned_cases(2)
-    e, f = (plan["E"] - 0.48) / 0.06, (plan["F"] - 0.45) / 0.1
-    noise = 0.01 * (plan["replicate"] - 1.5)
-    planes = {"centre_height": 0.009 - 0.001 * f, "rolled_fraction": 0.2 + noise, "wall_drag": 0.4 + 0.05 * f}
-    replay = Replay(plan.assign(status="finished", reason="", angle=30.0 + 2.0 * e - f, **planes))
-    # What is planted comes back to rounding, in millimetres and per cent; noise of no factor is none.
-    assert replay.slopes.loc["angle", ["E", "F"]].tolist() == pytest.approx([2.0, -1.0])
-    assert replay.slopes.loc["centre_height", ["E", "F"]].tolist() == pytest.approx([0.0, -1.0], abs=1e-9)
-    assert replay.slopes.loc["rolled_fraction", ["E", "F"]].tolist() == pytest.approx([0.0, 0.0], abs=1e-9)
-    assert replay.slopes.loc["wall_drag", "F"] == pytest.approx(5.0)
-    assert replay.course["rolled_fraction"].tolist() == pytest.approx([20.0] * 6)
-    climb = published_runs().query("stage == 'climb'")
-    assert replay.course["wall_drag"].tolist() == pytest.approx(40.0 + 5.0 * (climb["F"] - 0.45) / 0.1)
-
-
 def test_the_papers_own_noise_is_that_of_its_replicates() -> None:
     # The pure error of the five composite centres; the standard deviation of 30.121, 31.574 and 29.283.
     assert published_noise() == pytest.approx((math.sqrt(0.298741), 1.159176), rel=1e-6)

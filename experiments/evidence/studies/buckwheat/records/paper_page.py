@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,49 +29,15 @@ RECORD = "record"
 FOLDER = Path(__file__).parents[1] / RECORD
 SCATTER, NOTES = "agreement.png", "notes.md"
 SIDE_STUDIES = "side_studies.md"
-"""Chapters on variants of the model and on other bases, as the code of commit e6d63b6a wrote them."""
-
-
-@dataclass(frozen=True, eq=False)
-class Record:
-    """Everything that a record's page is made from."""
-
-    replay: Replay
-    """The paper's runs at full scale."""
-    provenance: Mapping[str, Any]
-    """Origin of the numbers: commit, machine, date, wall times."""
-    campaign: Mapping[str, Any] | None = None
-    """Campaign of our own: outcome, reason, effects of its screening."""
-    card: bool = False
-    """There is a card of the material that it chose."""
-    notes: str = ""
-    """A person's reading of the numbers, Markdown."""
-    side_studies: str = ""
-    """Chapters on variants and other bases, Markdown."""
-
-    @classmethod
-    def read(cls, folder: Path) -> Record:
-        """Read the tables of a record; a folder that holds none raises `FileNotFoundError`."""
-        campaign = folder / CAMPAIGN
-        return cls(
-            Replay(pd.read_csv(folder / RUNS)),
-            json.loads((folder / PROVENANCE).read_text(encoding="utf-8")),
-            json.loads(campaign.read_text(encoding="utf-8")) if campaign.is_file() else None,
-            (folder / CARD).is_file(),
-            *(
-                path.read_text(encoding="utf-8") if path.is_file() else ""
-                for path in (folder / NOTES, folder / SIDE_STUDIES)
-            ),
-        )
+"""Chapters on steel, variants of the model and other bases, as earlier code wrote them."""
+READ = (".md", ".json")
+"""Files of a record that are read as text."""
 
 
 def write_record(
     folder: Path, cases: pd.DataFrame, provenance: Mapping[str, Any], campaign: Campaign | None = None
 ) -> Path:
-    """Write the tables of a record, and its page; return the page.
-
-    Its cases are the paper's runs simulated again; the campaign is our own. Notes in the folder are taken in.
-    """
+    """Write the tables of a record of the paper's runs, and its page; return the page."""
     write_text(folder / RUNS, cases.to_csv(index=False))
     write_text(folder / PROVENANCE, _json(provenance))
     if campaign is not None:
@@ -82,12 +47,12 @@ def write_record(
 
 def write_record_page(folder: Path) -> Path:
     """Write the page of a record, and its plot, again from its tables."""
-    record = Record.read(folder)
-    runs = record.replay.runs[lambda runs: runs["stage"].isin(DESIGNS) & runs["angle"].notna()]
+    replay = Replay(pd.read_csv(folder / RUNS))
+    runs = replay.runs[lambda runs: runs["stage"].isin(DESIGNS) & runs["angle"].notna()]
     groups = [TABLES[stage] for stage in runs["stage"]]
-    figure = agreement_plot(record.replay.agreement(), groups, "simulated angle [°]", "published angle [°]")
+    figure = agreement_plot(replay.agreement(), groups, "simulated angle [°]", "published angle [°]")
     save_figure(figure, folder / SCATTER, dpi=130)
-    write_text(folder / PAGE, record_page(record))
+    write_text(folder / PAGE, record_page(folder))
     return folder / PAGE
 
 
@@ -107,45 +72,46 @@ def campaign_effects(campaign: Mapping[str, Any] | None) -> pd.DataFrame | None:
     return pd.DataFrame.from_dict(campaign["effects"], orient="index")
 
 
-def record_page(record: Record) -> str:
-    """Write the page as Markdown."""
-    laid_out = replay_tables(record.replay, campaign_effects(record.campaign))
+def record_page(folder: Path) -> str:
+    """Write the page of a record as Markdown."""
+    texts = {
+        path.name: path.read_text(encoding="utf-8") for path in folder.glob("*.*") if path.suffix in READ
+    }
+    facts, campaign = json.loads(texts[PROVENANCE]), json.loads(texts.get(CAMPAIGN, "null"))
+    laid_out = replay_tables(Replay(pd.read_csv(folder / RUNS)), campaign_effects(campaign))
     tables = {name: markdown_table(table) for name, table in laid_out.items()}
     return markdown_page(
         "# The paper's runs, simulated again",
         "Every run of Tables 3, 5 and 6 of the paper and its verification, with the published angles. This "
         "page is made from the files next to it: "
         "`python -m experiments.evidence.studies.buckwheat.records.paper_page`.",
-        facts_list(record.provenance),
-        wall_times_table(record.provenance, "heaps"),
+        facts_list(facts),
+        wall_times_table(facts, "heaps"),
         "## Agreement",
         tables["agreement"],
         f"![Simulated against published angles]({SCATTER})",
-        record.notes,
+        texts.get(NOTES, ""),
         "## Screening",
         tables["effects"],
         "## Response surface",
         tables["anova"],
         tables["coefficients"],
-        "## Where the friction of steel acts",
-        tables["course"],
-        tables["slopes"],
         "## Verification",
         tables["verification"],
-        *_campaign(record),
-        record.side_studies,
+        *_campaign(campaign, (folder / CARD).is_file()),
+        texts.get(SIDE_STUDIES, ""),
         "## Every run",
         tables["runs"],
         f"Every heap, with its seed, stands in [{RUNS}]({RUNS}).",
     )
 
 
-def _campaign(record: Record) -> list[str]:
-    if record.campaign is None:
+def _campaign(campaign: Mapping[str, Any] | None, card: bool) -> list[str]:
+    if campaign is None:
         return []
-    outcome = f"Outcome: {record.campaign['outcome']}. {record.campaign['reason']}"
-    card = f"The material, and all settings that are as good: [{CARD}]({CARD})." if record.card else ""
-    return ["## Our own campaign", outcome, card]
+    outcome = f"Outcome: {campaign['outcome']}. {campaign['reason']}"
+    link = f"The material, and all settings that are as good: [{CARD}]({CARD})." if card else ""
+    return ["## Our own campaign", outcome, link]
 
 
 def _json(value: Mapping[str, Any]) -> str:

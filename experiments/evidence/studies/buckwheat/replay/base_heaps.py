@@ -21,7 +21,6 @@ from experiments.cases import OwnWorkers, Store
 from experiments.cases.execute import build_cases
 from experiments.cases.measuring import measuring_processes
 from experiments.cases.workers.own import THIS_MACHINE
-from experiments.evidence.studies.buckwheat.replay.replay import COURSE
 from experiments.evidence.studies.buckwheat.replay.runs import DESIGNS, planned_cases
 from experiments.io.files import write_text
 from experiments.studyfile import load_study
@@ -49,7 +48,7 @@ ESTIMATORS = {
 }
 """Ways to read a heap, in words, in the order that ends a tie. All but the last are fits of `imaging`."""
 
-OBSERVED = tuple(name for name in COURSE if name != "angle")
+OBSERVED = ("centre_height", "rolled_fraction", "wall_drag")
 """Observables of a heap that are kept next to its angles."""
 
 

@@ -6,8 +6,6 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from statsmodels.regression.linear_model import OLS
-from statsmodels.tools import add_constant
 
 from doe import (
     Agreement,
@@ -32,23 +30,12 @@ ALL = "Tables 3, 5 and 6"
 """The 31 runs of all designs together."""
 
 
-COURSE = {
-    "angle": ("angle [°]", 1.0),
-    "centre_height": ("height of the centre of mass [mm]", 1e3),
-    "rolled_fraction": ("grains beyond two tube radii [%]", 100.0),
-    "wall_drag": ("weight that hangs on the tube [%]", 100.0),
-}
-"""Observables of a heap that tell where the friction of steel acts, on the plate or on the tube: titles, and
-factors to their units."""
-
-
 @dataclass(frozen=True, eq=False)
 class Replay:
     """Simulated cases of the paper's runs."""
 
     cases: pd.DataFrame
-    """A row a case: stage, run, replicate, angle [deg]; failed ones have no angle. Of further columns only
-    `COURSE` is read."""
+    """A row a case: stage, run, replicate, angle [deg]; failed ones have no angle."""
 
     @cached_property
     def measured(self) -> pd.DataFrame:
@@ -145,27 +132,6 @@ class Replay:
         return pd.DataFrame(columns).rename_axis("term")
 
     @cached_property
-    def course(self) -> pd.DataFrame:
-        """Means over the heaps of the climb's runs: run, E, F, published [deg], and `COURSE`."""
-        climb = self.runs[self.runs["stage"] == "climb"].set_index("run")[["E", "F", "published"]]
-        return climb.join(_course(self._of("climb")).groupby("run").mean()).reset_index()
-
-    @cached_property
-    def slopes(self) -> pd.DataFrame:
-        """Slopes over the composite design's heaps, by observable of `COURSE`.
-
-        Columns ``E``, ``F``: change a coded unit, of a plane fitted by least squares; ``E_t``, ``F_t``: over
-        its standard error.
-        """
-        heaps = _course(self._of("composite"))
-        coded = add_constant(paper.composite_design().select(heaps.index.tolist()).coded)
-        rows = {}
-        for name in heaps:
-            plane = OLS(heaps[name].to_numpy(), coded).fit()
-            rows[name] = {**plane.params[["E", "F"]], **plane.tvalues[["E", "F"]].add_suffix("_t")}
-        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("observable")
-
-    @cached_property
     def verification(self) -> dict[str, Comparison]:
         """Heaps at the published optimum against the measured angle: the paper's three, and ours."""
         target = paper.measured()
@@ -198,11 +164,6 @@ def published_noise() -> tuple[float, float]:
 
 def _labels(cases: pd.DataFrame) -> pd.MultiIndex:
     return pd.MultiIndex.from_frame(cases[RUN])
-
-
-def _course(cases: pd.DataFrame) -> pd.DataFrame:
-    factors = {name: factor for name, (_, factor) in COURSE.items()}
-    return cases.set_index("run")[list(factors)] * pd.Series(factors)
 
 
 def _settings(runs: pd.DataFrame) -> np.ndarray:

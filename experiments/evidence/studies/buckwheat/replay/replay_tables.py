@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from experiments.evidence.studies.buckwheat.replay.replay import COURSE, Replay, published_noise
+from experiments.evidence.studies.buckwheat.replay.replay import Replay, published_noise
 from experiments.evidence.studies.buckwheat.replay.runs import TABLES
 from experiments.report.kit.numbers import estimate, fixed
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
@@ -25,8 +25,6 @@ def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[
         "effects": replay_effects_table(replay, campaign),
         "anova": replay_anova_table(replay),
         "coefficients": replay_coefficients_table(replay),
-        "course": course_table(replay),
-        "slopes": slopes_table(replay),
         "verification": replay_verification_table(replay),
         "runs": runs_table(replay),
     }
@@ -142,28 +140,3 @@ def replay_verification_table(replay: Replay) -> Table:
     ]
     caption = "Heaps at the published optimum against the measured angle."
     return make_table("replay-verification", pd.DataFrame(rows), shown, caption)
-
-
-def course_table(replay: Replay) -> Table:
-    """Lay out what became of the grains along the climb."""
-    shown: Layout = [
-        "run",
-        *columns("value", E="E", F="F"),
-        Column("published", "published angle", "angle", "°"),
-        *(Column(name, title, "ratio") for name, (title, _) in COURSE.items()),
-    ]
-    caption = "Along the steepest climb, means of the heaps of a run."
-    note = (
-        "The weight on the tube is the grains' own, a mean while it is drawn; beyond two tube radii lie "
-        "those that slid or rolled off."
-    )
-    return make_table("replay-course", replay.course, shown, caption, note)
-
-
-def slopes_table(replay: Replay) -> Table:
-    """Lay out how the observables change over the composite design."""
-    frame = replay.slopes.rename(index={name: title for name, (title, _) in COURSE.items()}).reset_index()
-    error = "over its error"
-    shown: Layout = ["observable", *columns("ratio", E="a step of E", E_t=error, F="a step of F", F_t=error)]
-    note = "Planes by least squares through all heaps of Table 6; a step is one coded unit."
-    return make_table("replay-slopes", frame, shown, "Slopes over Table 6.", note)
