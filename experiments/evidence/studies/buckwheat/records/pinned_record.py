@@ -14,7 +14,9 @@ from experiments.studyfile import load_study
 SCALE = "bench"
 FOLDER = Path(__file__).parents[1] / "point"
 PAGE, TABLE = "pinned.md", "pinned.csv"
-MADE = "27 November 2026, on an H200, with readings of E and F; the study now reads E and G"
+MADE = "28 November 2026, on an H200"
+SHARE = 5.0
+"""Largest region that is asked for, of what was explored [%]."""
 ASKED = {"E": 15.0, "F": 15.0, "G": 30.0}
 """Half of each factor's interval over its value, at most [%]."""
 
@@ -42,13 +44,15 @@ def write_pinned_page() -> Path:
     table = pd.read_csv(FOLDER / TABLE)
     within = {name: int((table[f"{name} ±"] <= most).sum()) for name, most in ASKED.items()}
     facts = ", ".join(f"{name} known to {ASKED[name]:g} % in {count}" for name, count in within.items())
+    small = int((table["share"] <= SHARE).sum())
     held = ", ".join(f"{name} in {int(table[f'{name} held'].sum())}" for name in ASKED)
     return write_page(
         FOLDER / PAGE,
         "# The README's campaign, seed by seed",
         f"With {len(table)} seeds, each with other heaps and other readings, the compatible region held the "
         f"hidden settings in {int(table['truth inside'].sum())}; {facts}; the interval held the hidden value "
-        f"of {held}. Share: of what was explored, at most {table['share'].max():.1f} %. ±: half of the 95 % "
+        f"of {held}. Share: of what was explored, at most {SHARE:g} % in {small} "
+        f"and at most {table['share'].max():.1f} % in all. ±: half of the 95 % "
         "interval over the hidden value. The command "
         "`python -m experiments.evidence.studies.buckwheat.records.pinned_record` repeats it "
         f"({MADE}).",
