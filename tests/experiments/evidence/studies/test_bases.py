@@ -16,6 +16,7 @@ from dem_warp import Case, CaseResult
 from experiments.cases import OwnWorkers, Store
 from experiments.cases.workers import own
 from experiments.evidence.studies.buckwheat.records import base_page
+from experiments.evidence.studies.buckwheat.records.base_disagreement import disagreement
 from experiments.evidence.studies.buckwheat.replay import base_heaps
 from experiments.evidence.studies.buckwheat.replay.base_choice import (
     GO_ON,
@@ -40,13 +41,13 @@ from imaging import heap_angle
 TRUTH = "relative-keeled-round", "middle"
 
 
-def made_up(offset: Callable[[str, str, pd.Series], Any], replicates: int = 3) -> pd.DataFrame:
+def made_up(offset: Callable[[str, str, pd.DataFrame], Any], replicates: int = 3) -> pd.DataFrame:
     """Heaps of all bases: the published angle, noise of a heap of 0.5 degrees, and an offset [deg]."""
     rng, parts = np.random.default_rng(3), []
     for base in BASES:
         plan = planned_cases(replicates, DESIGNS)
         noisy = plan["published"] + 0.5 * rng.standard_normal(len(plan))
-        angles = {name: noisy + offset(base, name, plan["stage"]) for name in ESTIMATORS}
+        angles = {name: noisy + offset(base, name, plan) for name in ESTIMATORS}
         parts.append(plan.assign(base=base, **angles))
     return pd.concat(parts)
 
@@ -84,11 +85,7 @@ def test_the_four_bases_of_least_misfit_go_on(heaps: pd.DataFrame) -> None:
 
 def test_a_base_that_fails_in_one_table_is_chosen_without_it_alone() -> None:
     found = BaseChoice.of(
-        made_up(
-            lambda base, _, stage: (
-                9.0 * (stage == "composite") if base == TRUTH[0] else np.full(len(stage), 3.0)
-            )
-        )
+        made_up(lambda base, _, runs: 9.0 * (runs["stage"] == "composite") if base == TRUTH[0] else 3.0)
     )
     assert {out: each.base == TRUTH[0] for out, each in found.left_out.items()} == {
         "screening": False, "climb": False, "composite": True,
@@ -174,3 +171,18 @@ def test_the_page_says_which_aims_are_met_and_what_is_reproduced(heaps: pd.DataF
     assert found.loc["Table 3, two strongest factors", "published"] == "F, E"
     assert found.loc["Table 6, coefficient of F [°]", "published"] == "1.12"
     assert (found["reproduced"] == "no").sum() == len(found) - 1
+
+
+def test_the_clump_that_the_chosen_base_lacks_is_found() -> None:
+    def offset(base: str, _: str, runs: pd.DataFrame) -> pd.Series:
+        """Give one base the published angles, and the others 6 degrees more where steel is rough."""
+        return 6.0 * (runs["F"] > 0.4) * (base != "relative-swelling-round")
+
+    heaps = made_up(offset)
+    lacking = BaseChoice.of(heaps[heaps["base"] == "relative-bulging-round"]).candidates[0]
+    found = disagreement(heaps, lacking)
+    assert found.base.q > found.base.q_limit
+    assert found.candidates[0].mechanisms == ("relative-swelling-round",)
+    assert found.candidates[0].sizes[0].value == pytest.approx(1.0, abs=0.2)  # three times its error
+    right = BaseChoice.of(heaps[heaps["base"] == "relative-swelling-round"]).candidates[0]
+    assert disagreement(heaps, right).verdict == "none"
