@@ -13,6 +13,7 @@ from experiments.evidence.verification.problems.liggghts_contacts import liggght
 from experiments.evidence.verification.problems.micro_slip_path import micro_slip
 from experiments.evidence.verification.problems.normal_impact import elastic_impact, restitution
 from experiments.evidence.verification.problems.oblique_impact import oblique_impact, spinning_impact
+from experiments.evidence.verification.problems.pair_laws import pair_laws
 from experiments.evidence.verification.problems.penetrated import penetrated
 from experiments.evidence.verification.problems.pressed import pressed, sheared
 from experiments.evidence.verification.problems.released_boxes import released
@@ -28,6 +29,7 @@ PROBLEMS: dict[str, Problem] = {
     "micro-slip": micro_slip,
     "spinning-impact": spinning_impact,
     "friction-and-rolling": friction_and_rolling,
+    "pair-laws": pair_laws,
     "rigid-body": rigid_body,
     "liggghts-contacts": liggghts_contacts,
     "liggghts-clumps": liggghts_clumps,
