@@ -3,8 +3,7 @@
 The four pair tests of the ON-DEM action (normal, tangential, rolling, twisting), in our own numbers.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,61 +36,48 @@ sphere's own spin; the others have none. Restitution is 1, and dashpots are off:
 of the theory. The impacts of other chapters have the dashpots."""
 
 
-@dataclass(frozen=True)
-class Drive:
-    """Motion that is given to the second sphere; the first has the opposite."""
-
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    signs: tuple[float, ...] = (1.0,)
-    """Direction of each stretch."""
-
-
 LENGTH = 0.5 * OVERLAP / (STEP * STEPS)
 """Speed of a sphere that moves half the overlap in a stretch [m/s]."""
 
-DRIVES = {
-    "normal": Drive(velocity=(0.0, 0.0, -LENGTH), signs=(1.0, -1.0)),
-    "tangential": Drive(velocity=(LENGTH, 0.0, 0.0), signs=(1.0, -1.0, -1.0, 1.0)),
-    "rolling": Drive(spin=(0.0, LENGTH / RADIUS, 0.0), signs=(1.0, -1.0, -1.0, 1.0)),
-    "twisting": Drive(spin=(0.0, 0.0, LENGTH / RADIUS), signs=(1.0, -1.0)),
+TESTS = {
+    "normal": (0, 2, -LENGTH, (1.0, -1.0)),
+    "tangential": (0, 0, LENGTH, (1.0, -1.0, -1.0, 1.0)),
+    "rolling": (1, 1, LENGTH / RADIUS, (1.0, -1.0, -1.0, 1.0)),
+    "twisting": (1, 2, LENGTH / RADIUS, (1.0, -1.0)),
 }
-"""Each test: spheres above each other along z."""
+"""By test: force (0) or torque (1), and its axis; speed [m/s] or spin [rad/s] along it of the upper sphere,
+whose opposite the other has; directions of the stretches."""
 
 
-def driven(laws: ContactLaws, test: str, device: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return force [N] and torque [N m] on the second sphere in each step, (steps, 3) each."""
+def driven(laws: ContactLaws, test: str, device: str) -> np.ndarray:
+    """Return the force [N] or torque [N m] on the second sphere in each step, (steps,)."""
     surface = Interaction(1.0, FRICTION, ROLLING)
     law = ContactCoefficients.of_pair(SUBSTANCE, SUBSTANCE, surface, laws, radius=0.5 * RADIUS)
     law = replace(law, damping=0.0)  # the polynomial of LAMMPS makes 3e-4 of a restitution of 1
-    drive, gap = DRIVES[test], 0.0 if test == "normal" else OVERLAP
-    places = [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0 * RADIUS - gap]]
+    kind, axis, speed, signs = TESTS[test]
+    places = [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0 * RADIUS - (0.0 if test == "normal" else OVERLAP)]]
     setup = world(bodies(places, SUBSTANCE.density), ClumpShape.sphere(RADIUS), law, STEP, extent=0.1)
     solver = WatchedSolver([replace(setup, forms=laws.forms)], device, "double")
-    rates: list[tuple[np.ndarray, np.ndarray]] = []
-    given = [(sign * np.array(drive.velocity), sign * np.array(drive.spin)) for sign in drive.signs]
-    motions = [motion for motion in given for _ in range(STEPS)]
-    give(solver.grains[0], *motions[0])
+    motions = speed * np.repeat(signs, STEPS)
+    changes: list[float] = []
+
+    def give(state: Any, rate: float) -> None:
+        for number, array in enumerate((state.velocity, state.spin)):
+            kept = array.numpy()
+            kept[:, :3] = 0.0
+            kept[:, axis] = np.array([-rate, rate]) * (number == kind)
+            array.assign(kept)
 
     def see(state: Any) -> None:
-        if len(rates) == len(motions):  # steps that end a cycle
-            return
-        now, (velocity, spin) = Motion.of(state, 2), motions[len(rates)]
-        rates.append((now.velocities[1] - velocity, now.spins[1] - spin))
-        give(state, *motions[min(len(rates), len(motions) - 1)])
+        if len(changes) < len(motions):  # further steps end a cycle
+            now = Motion.of(state, 2)
+            changes.append((now.velocities, now.spins)[kind][1, axis] - motions[len(changes)])
+            give(state, motions[min(len(changes), len(motions) - 1)])
 
+    give(solver.grains[0], motions[0])
     solver.watch(len(motions), see)
     mass = SUBSTANCE.density * 4.0 / 3.0 * np.pi * RADIUS**3
-    changes = np.array(rates) / STEP
-    return mass * changes[:, 0], 0.4 * mass * RADIUS**2 * changes[:, 1]
-
-
-def give(state: Any, velocity: np.ndarray, spin: np.ndarray) -> None:
-    """Set the motion of both spheres."""
-    for array, value in ((state.velocity, velocity), (state.spin, spin)):
-        kept = array.numpy()
-        kept[:, :3] = [-value, value]
-        array.assign(kept)
+    return np.array(changes) / STEP * (mass, 0.4 * mass * RADIUS**2)[kind]
 
 
 def spring(paths: np.ndarray, stiffness: float, limit: float) -> np.ndarray:
@@ -133,10 +119,10 @@ def expected(test: str, laws: ContactLaws) -> tuple[np.ndarray, float]:
     """Return the closed form of the force or torque in each step, and its largest size."""
     wider = np.sqrt(2.0) if laws.normal == "overlap_circle" else 1.0
     modulus, shear = (wider * each for each in effective())
-    reduced, drive = 0.5 * RADIUS, DRIVES[test]
+    reduced = 0.5 * RADIUS
     load = 4.0 / 3.0 * modulus * np.sqrt(reduced) * OVERLAP**1.5
     tangential = 8.0 * shear * np.sqrt(reduced * OVERLAP)
-    signs = np.repeat(drive.signs, STEPS)
+    signs = np.repeat(TESTS[test][3], STEPS)
     paths = 2.0 * STEP * signs * (LENGTH if test != "rolling" else LENGTH / RADIUS)
     if test == "normal":
         depth = np.concatenate([[0.0], np.cumsum(paths)[:-1]])
@@ -151,21 +137,13 @@ def expected(test: str, laws: ContactLaws) -> tuple[np.ndarray, float]:
     return found, ROLLING * reduced * load
 
 
-READ: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
-    "normal": lambda force, torque: force[:, 2],
-    "tangential": lambda force, torque: force[:, 0],
-    "rolling": lambda force, torque: torque[:, 1],
-    "twisting": lambda force, torque: torque[:, 2],
-}
-
-
 def pair_rows(name: str, device: str) -> list[Row]:
     """Rows of the four tests under a set of laws."""
     laws = replace(PRESETS[name], rolling_damping=0.0, rolling_dashpot=0.0)
     rows = []
-    for test, read in READ.items():
+    for test in TESTS:
         want, size = expected(test, laws)
-        got = read(*driven(laws, test, device))
+        got = driven(laws, test, device)
         labels = ("Driven pair", f"{name}, {test}", "over the largest, any step", "closed form of the set")
         rows.append(absolute_row(labels, want / size, got / size, TOLERANCES[test]))
     return rows
