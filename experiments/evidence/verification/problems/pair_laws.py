@@ -14,14 +14,14 @@ from experiments.evidence.verification.check import Result, Row, absolute_row
 from experiments.evidence.verification.problems.setups import Motion, WatchedSolver, bodies, world
 
 RADIUS, OVERLAP = 5e-3, 5e-6
-"""Of each sphere, and of the contact at rest [m]."""
+"""Radius of a sphere, and overlap of the contact [m]."""
 SUBSTANCE = Material(density=1e8, shear_modulus=10e6, poisson_ratio=0.25)
 """So heavy that forces hardly change the given motion."""
 FRICTION, ROLLING = 0.4, 0.1
 STEP, STEPS = 1e-6, 400
 """Time step [s] and steps of each stretch of a test."""
 TOLERANCES = {"normal": 1e-5, "tangential": 2e-3, "rolling": 1e-5, "twisting": 1e-5}
-"""Of the largest force or torque: the rounding of the spheres' speeds. As one slides by an overlap, the
+"""Errors over the largest force or torque: the rounding of the spheres' speeds. As one slides by an overlap, the
 normal turns by 1/2000, which adds 1/800 of mu F_n to the force along x."""
 
 TEXT = """Two equal spheres are driven through a contact at given speeds; the force or torque is read from
@@ -45,7 +45,7 @@ TESTS = {
     "rolling": (1, 1, LENGTH / RADIUS, (1.0, -1.0, -1.0, 1.0)),
     "twisting": (1, 2, LENGTH / RADIUS, (1.0, -1.0)),
 }
-"""By test: force (0) or torque (1), and its axis; speed [m/s] or spin [rad/s] along it of the upper sphere,
+"""Tests: force (0) or torque (1), and its axis; speed [m/s] or spin [rad/s] along it of the upper sphere,
 whose opposite the other has; directions of the stretches."""
 
 
