@@ -21,8 +21,8 @@ FRICTION, ROLLING = 0.4, 0.1
 STEP, STEPS = 1e-6, 400
 """Time step [s] and steps of each stretch of a test."""
 TOLERANCES = {"normal": 1e-5, "tangential": 2e-3, "rolling": 1e-5, "twisting": 1e-5}
-"""Errors over the largest force or torque: the rounding of the spheres' speeds. As one slides by an overlap, the
-normal turns by 1/2000, which adds 1/800 of mu F_n to the force along x."""
+"""Errors over the largest force or torque: the rounding of the spheres' speeds. As one slides by an overlap,
+the normal turns by 1/2000, which adds 1/800 of mu F_n to the force along x."""
 
 TEXT = """Two equal spheres are driven through a contact at given speeds; the force or torque is read from
 what it does to them in each step. *Normal*: they approach and part. Hertz's force is 4/3 E* sqrt(R*)
