@@ -16,7 +16,7 @@ from experiments.evidence.verification.problems.setups import Motion, WatchedSol
 RADIUS, OVERLAP = 5e-3, 5e-6
 """Radius of a sphere, and overlap of the contact [m]."""
 SUBSTANCE = Material(density=1e8, shear_modulus=10e6, poisson_ratio=0.25)
-"""So heavy that forces hardly change the given motion."""
+"""Substance so heavy that forces hardly change the given motion."""
 FRICTION, ROLLING = 0.4, 0.1
 STEP, STEPS = 1e-6, 400
 """Time step [s] and steps of each stretch of a test."""
