@@ -68,7 +68,8 @@ def _texts(name: str) -> pd.DataFrame:
     if not path.is_file():
         known = ", ".join(sorted(file.stem for file in _FOLDER.glob("*.csv")))
         raise ValueError(f"a published table is one of {known}, got {name!r}")
-    return pd.read_csv(path, dtype=str, keep_default_na=False, index_col=0)
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    return table.set_index(table.columns[0])  # pandas 2 would make numbers of index_col
 
 
 @cache
