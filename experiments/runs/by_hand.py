@@ -149,8 +149,9 @@ class _Sheets:
 
         With a new sheet come the values, the spheres and the protocol of a case.
         """
-        settings = asked[0].settings if asked else {}
-        columns = [CASE, *PLACES, *settings, *_heads(self.results)]
+        if not asked:  # the study refused all of them
+            return {}
+        columns = [CASE, *PLACES, *asked[0].settings, *_heads(self.results)]
         sheets = sorted((self.folder / SHEETS).glob("*.csv"))
         filled = {row[CASE]: row for path in sheets for row in read_rows(path, [CASE], columns)}
         fresh = [run for run in asked if run.key not in filled]
