@@ -136,9 +136,7 @@ def _of_scene(section: CandidateSection, scenes: Mapping[str, SceneSection]) -> 
     readings, assumed = [], list[str]()
     for name in section.observables or ("",):
         if name not in known:
-            raise ValueError(
-                f"observables must be what the scene measures, {nearest_name(name, list(known))}"
-            )
+            raise ValueError(f"observables {scene.unknown(name, known)}")
         unit, instrument = known[name].unit, instrument_of(known[name])
         own = defaults.get(f"{instrument}-{unit}", defaults[instrument])
         response = Response(f"{test}_{name}", name, unit, test)

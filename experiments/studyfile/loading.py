@@ -19,6 +19,7 @@ from experiments.studyfile.factor_section import (
     check_one_home,
     merge,
     natural_value,
+    rescaled,
     with_factor_values,
 )
 from experiments.studyfile.places import Places
@@ -57,7 +58,7 @@ def load_study(
     if scale is not None:
         if scale not in scales:
             raise StudyError(str(path), f"has no such scale, {nearest_name(scale, list(scales))}", scale)
-        document = merge(document, scales[scale])
+        document, places = rescaled(document, scales[scale], places)
     return build_study(with_material(merge(document, changes or {}), path.parent), places)
 
 

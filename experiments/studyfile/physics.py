@@ -15,7 +15,7 @@ from pydantic import Field, field_validator, model_validator
 
 from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, PouredScene, ShapeMixture, WallPart
 from dem_warp.laws.mechanism import check_forms
-from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
+from dem_warp.population import FRACTION_TOLERANCE, SIZE_LIMIT, size_of_mean_mass
 from dem_warp.scenes.walled_scene import TooManyGrainsError
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
@@ -114,6 +114,8 @@ class GrainSection(MaterialSection, ShapeSection):
     @model_validator(mode="after")
     def _has_its_shapes(self) -> Self:
         shape = self.shape()
+        if not SIZE_LIMIT * self.size_sd < self.size_mean:
+            raise ValueError(f"size_sd must be below size_mean / {SIZE_LIMIT:g}, got {self.size_sd:g}")
         replaced = {"size_mean", "size_mean_of"} & self.model_fields_set
         if self.thousand_grain_mass is not None and (self.sizes is not None or replaced):
             raise ValueError("must have thousand_grain_mass or other sizes, not both")
@@ -161,20 +163,26 @@ class GrainSection(MaterialSection, ShapeSection):
         shape = self.shape()
         if self.sizes is not None and isinstance(shape, ClumpShape):
             return self.sizes.population(shape, self.material())
-        mean, spread = self.size_mean, self.size_sd
+        size, spread = self.size_mean, self.size_sd / self.size_mean
         if self.thousand_grain_mass is not None:
-            mean, shape = size_of_mean_mass(1.0, spread), self._scaled(shape, self.thousand_grain_mass)
-        if self.size_mean_of == "masses":
-            mean = size_of_mean_mass(mean, spread)
-        return GrainPopulation(shape=shape, material=self.material(), size_mean=mean, size_sd=spread)
+            size = self._scale(shape, self.thousand_grain_mass)
+        by_mass = self.size_mean_of == "masses" or self.thousand_grain_mass is not None
+        mean = size_of_mean_mass(1.0, spread) if by_mass else 1.0
+        # the tests pour as many grains as their container holds of size 1
+        return GrainPopulation(_scaled(shape, size), self.material(), size_mean=mean, size_sd=spread)
 
-    def _scaled(self, shape: ClumpShape | ShapeMixture, mass: float) -> ClumpShape | ShapeMixture:
-        """Scale a shape, or all of a mixture, to a mass of 1,000 grains [kg]."""
+    def _scale(self, shape: ClumpShape | ShapeMixture, mass: float) -> float:
+        """Return the size of a shape, or of a mixture, with a mass of 1,000 grains [kg]."""
         volume = GrainPopulation(shape=shape, material=self.material()).mean(lambda one: one.volume)
-        scale = math.cbrt(1e-3 * mass / (self.density * volume))
-        if isinstance(shape, ClumpShape):
-            return shape.scaled(scale)
-        return replace(shape, shapes=tuple(one.scaled(scale) for one in shape.shapes))
+        return math.cbrt(1e-3 * mass / (self.density * volume))
+
+
+def _scaled(shape: ClumpShape | ShapeMixture, scale: float) -> ClumpShape | ShapeMixture:
+    if scale == 1.0:
+        return shape
+    if isinstance(shape, ClumpShape):
+        return shape.scaled(scale)
+    return replace(shape, shapes=tuple(one.scaled(scale) for one in shape.shapes))
 
 
 # The integrals over a shape take milliseconds, and every case of a campaign needs them.

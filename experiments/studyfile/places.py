@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,16 @@ class Places:
             if path[:length] in self.lines:
                 return self._name(self.lines[path[:length]], path)
         return self._name(None, path)
+
+    def numbered(self, key: str, names: Sequence[str]) -> Places:
+        """Find what the scale says of the tables of an array by their names by their numbers, too."""
+        lines, start = dict(self.lines), ("scale", self.scale or "", key)
+        for path, line in self.lines.items():
+            if path[:3] == start and len(path) > 3:
+                number = names.index(str(path[3]))
+                lines.setdefault((*start, number), line)
+                lines[(*start, number, *path[4:])] = line
+        return replace(self, lines=lines)
 
     def _name(self, line: int | None, path: KeyPath) -> str:
         where = str(self.file) if line is None else f"{self.file}:{line}"

@@ -59,7 +59,11 @@ def study_reference() -> tuple[Row, ...]:
     return (
         Row("", "material", "text", meaning="Material card whose sections hold where the study lacks them."),
         *_rows(Study, ""),
-        Row("[scale.NAME]", "", meaning="Sections that differ at a scale, merged over the rest."),
+        Row(
+            "[scale.NAME]",
+            "",
+            meaning="Sections that differ at a scale, merged over the rest; factor.NAME changes one [[factor]].",
+        ),
     )
 
 

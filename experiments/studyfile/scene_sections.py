@@ -2,15 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Self
 
 from pydantic import model_validator
 
 from dem_warp import SCENES, Material
+from dem_warp.scenes.poured_heap import FLOW
 from dem_warp.scenes.scene import Observable
 from dem_warp.scenes.walled_scene import WalledScene
+from experiments.io.texts import nearest_name
 from experiments.studyfile.generated import EngineSection, LibrarySection, library_section
+
+_STRENGTHS = (
+    "friction_angle",
+    "cohesion",
+    "steady_angle",
+    "consolidation_stress",
+    "unconfined",
+    "flow_ratio",
+)
+_OF_FUNNEL = (*FLOW, "fill_height", "solid_fraction")
+
+ABSENT: tuple[tuple[str, Callable[[Any], bool], str, tuple[str, ...]], ...] = (
+    ("compression", lambda own: not own.taps, "taps", ("tapped_density", "hausner_ratio")),
+    ("drop", lambda own: not own.plate_angle, "an inclined plate", ("tangential_ratio",)),
+    ("poured-heap", lambda own: own.mass_rate, "no mass_rate", _OF_FUNNEL),
+    ("shear", lambda own: own.base == "smooth", "a rough base", _STRENGTHS),
+    ("shear", lambda own: own.base == "rough", "a smooth base", ("wall_friction_angle",)),
+)
+"""Observables that a test does not have as it is set: its name, when, what they need, beginnings of
+their names."""
 
 
 class TestSection(EngineSection):
@@ -43,7 +65,20 @@ class SceneSection(LibrarySection):
 
     @property
     def observables(self) -> Mapping[str, Observable]:
-        return self.kind.observables
+        """Observables that the test has as it is set."""
+        absent = tuple(self._absent)
+        return {name: one for name, one in self.kind.observables.items() if not name.startswith(absent)}
+
+    @property
+    def _absent(self) -> dict[str, str]:
+        [(kind, own)] = self.given.items()
+        found = ((names, need) for scene, when, need, names in ABSENT if scene == kind and when(own))
+        return {name: need for names, need in found for name in names}
+
+    def unknown(self, name: str, known: Mapping[str, Any]) -> str:
+        """Say what the test needs to measure an observable, or which known one is meant."""
+        needs = [f"it needs {need}" for absent, need in self._absent.items() if name.startswith(absent)]
+        return f"must be what the scene measures, {(needs or [nearest_name(name, list(known))])[0]}"
 
     def scene(self, wall: Material) -> WalledScene:
         """Build the engine's scene, its walls of a material."""

@@ -255,7 +255,7 @@ def _observable(
     if section.weights is not None:
         return _combined(section.weights, known, path, places)
     if section.observable not in known:
-        rule = f"must be what the scene measures, {nearest_name(section.observable, list(known))}"
+        rule = scene.unknown(section.observable, known)
         raise StudyError(places.of((*path, "observable")), rule, section.observable)
     return known[section.observable]
 

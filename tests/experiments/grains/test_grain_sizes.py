@@ -358,3 +358,18 @@ def test_the_mass_of_a_thousand_grains_gives_their_size(write_study: Callable[..
         assert masses.mean() == pytest.approx(23.4572e-6, rel=0.008)
     with pytest.raises(StudyError, match="thousand_grain_mass or other sizes, not both"):
         load_study(write_study((radius, f'size_mean = 1.0\nthousand_grain_mass = "{mass}')))
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
+def test_as_many_grains_are_poured_as_fill_the_container_at_their_size(
+    write_study: Callable[..., Path], size: float
+) -> None:
+    path = write_study(
+        ('sphere = "2 mm"', f'sphere = "1 mm"\nsize_mean = {size}'), ("grain_count = 30\n", "")
+    )
+    case = load_study(path).case({}, 1)
+    drawn = case.grains.draw(100_000, 1)
+    assert drawn.sizes.mean() * drawn.clumps[0].radii[0] == pytest.approx(1e-3 * size, rel=0.003)
+    # the spread of 5 % in size adds 3 x .05^2 to the mean volume, which the number of grains leaves out
+    poured = case.scene.supply(case) * 4.0 / 3.0 * np.pi * (1e-3 * size) ** 3
+    assert poured == pytest.approx(case.scene.densest_fill * case.scene.volume, rel=0.005)

@@ -95,7 +95,7 @@ def test_a_search_reads_the_curve_of_a_condition(write_study: Callable[..., Path
 
 
 def test_what_a_press_measures_has_its_instrument(write_study: Callable[..., Path]) -> None:
-    study = load_study(write_study((TUBE, PRESS), (ANGLE, "")))
+    study = load_study(write_study((TUBE, f"{PRESS}taps = 9\n"), (ANGLE, "")))
     seen = {each.name: each for each in study.measurable}
     pressed = {"modulus", "unloading_modulus", "rebound", "base_share", "pressed_density", "strain_5"}
     assert {name for name in seen if instrument_of(seen[name]) is Instrument.PRESS} >= pressed

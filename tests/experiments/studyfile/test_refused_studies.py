@@ -16,6 +16,11 @@ HOPPER = '[scene.hopper]\ndiameter = "40 mm"\nfill_depth = "30 mm"\noutlet = "18
 DRUM = (
     '[scene.drum]\ndiameter = "32 mm"\nlength = "12 mm"\nrotation_rate = "1 1/s"\nrest_speed = "0.05 m/s"\n'
 )
+DIE = '[scene.compression]\ndiameter = "40 mm"\nfill_depth = "30 mm"\nstress = "1 kPa"\n'
+DROP = '[scene.drop]\nheight = "100 mm"\n'
+SHEAR = '[scene.shear]\nwidth = "40 mm"\nfill_depth = "30 mm"\nstress = "1 kPa"\nspeed = "0.05 m/s"\n'
+POURED = HOPPER.replace("hopper", "poured-heap") + 'drop = "50 mm"\nmass = "5 g"\nmass_rate = "20 g/s"\n'
+SEEN = '[[response]]\nobservable = "{}"\n'
 SHAPES = (
     '[grain.shapes.whole]\nsphere = "2 mm"\n[grain.shapes.split]\nclump = "split.txt"\nfraction = 0.25\n\n'
 )
@@ -135,6 +140,12 @@ REFUSED = [
     sizes("geometric_sd = 1.2", "", "grain.sizes", "a lognormal distribution needs geometric_sd"),
     sizes("geometric_sd = 1.2", "geometric_sd = 0.9", "grain.sizes.geometric_sd", "must be greater than 1"),
     sizes("geometric_sd = 1.2", 'geometric_sd = 1.2\nsd = "1 mm"', "grain.sizes", "must not have sd"),
+    changed(
+        'sphere = "2 mm"',
+        'sphere = "2 mm"\nsize_mean = 0.5\nsize_sd = 0.2',
+        "grain",
+        "below size_mean / 3, got 0.2",
+    ),
     sizes('"lognormal"', '"log"', "grain.sizes.distribution", "must be 'normal', 'lognormal'"),
     sizes('distribution = "lognormal"', 'counts = "none.csv"', "grain.sizes.counts", "no such file"),
     sizes("[grain.sizes]", "size_sd = 0.1\n[grain.sizes]", "grain", "or size_sd, not both"),
@@ -158,6 +169,25 @@ REFUSED = [
     scene(DRUM + 'picture = "top"\n', "scene.drum.picture", "'depth', 'silhouette' or 'end'"),
     scene(DRUM + 'camera_distance = "1 m"\n', "scene.drum", "must be left out with the picture depth"),
     scene(DRUM + 'inclination = "80 deg"\n', "scene.drum", "the bed at the lower end must be below"),
+    # Observables that a test does not have as it is set
+    *(
+        scene(test, "response[1].observable", f"the scene measures, it needs {need}", SEEN.format(name))
+        for test, name, need in (
+            (DIE, "tapped_density", "taps"),
+            (DIE, "hausner_ratio", "taps"),
+            (DROP, "tangential_ratio", "an inclined plate"),
+            (DROP, "tangential_ratio_sd", "an inclined plate"),
+            (SHEAR + 'base = "smooth"\n', "cohesion", "a rough base"),
+            (SHEAR, "wall_friction_angle", "a smooth base"),
+            (POURED, "flow_rate", "no mass_rate"),
+        )
+    ),
+    scene(
+        DIE,
+        "candidate[1]",
+        "the scene measures, it needs taps",
+        '[[candidate]]\ntest = "target"\nobservables = ["tapped_density"]\n',
+    ),
     changed(COUNT, 'tilt = "90 deg"\n', "scene.lifted-cylinder.tilt", "must be less than 90"),
     changed(
         COUNT,

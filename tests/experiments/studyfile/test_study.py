@@ -14,6 +14,7 @@ from experiments.studyfile import campaign, load_study, schema, study_scales, wr
 
 WriteStudy = Callable[..., Path]
 
+FACTOR, R = '[[factor]]\nname = "{}"\nlabel = "x"\nparameter = "{}"\nlow = 0.1\nhigh = 0.2\n', ("R", 0.1, 0.2)
 PAPER_FACTORS = {
     "A": (0.16, 0.42, ""),
     "B": (6.81, 61.84, "MPa"),
@@ -214,6 +215,37 @@ def test_every_breach_is_listed_with_its_scale(write_study: WriteStudy) -> None:
         f"{path}:6: grain.density",
         f"{path}:{last_line}: scale.stiff.numerics.precision",
     ]
+
+
+def test_a_scale_changes_the_range_of_a_factor_by_its_name(write_study: WriteStudy) -> None:
+    other = FACTOR.format("R", "contact.grain-wall.static_friction")
+    study = write_study(("static_friction = 0.4\n", ""), add=f"factor.E.low = 0.3\n{other}")
+    assert [(one.name, one.low, one.high) for one in load_study(study).factors] == [("E", 0.2, 0.6), R]
+    assert [(one.name, one.low, one.high) for one in load_study(study, "stiff").factors] == [
+        ("E", 0.3, 0.6),
+        R,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "place", "problem"),
+    [
+        ("factor.E.low = 0.9", "factor[1]", "low must be below high, got 0.9 and 0.6"),
+        ('factor.E.low = "3 mm"', "factor[1].low", "must be a plain number"),
+        ("factor.E.lo = 0.3", "factor[1].lo", "unknown key, did you mean 'low'"),
+        ("factor.e.low = 0.3", "factor.e.low", "must name a factor"),
+        ("factor.E = 0.3", "factor.E", "must be a table"),
+    ],
+)
+def test_a_wrong_change_of_a_factor_is_named_where_the_scale_has_it(
+    write_study: WriteStudy, change: str, place: str, problem: str
+) -> None:
+    path = write_study(add=f"{change}\n")
+    with pytest.raises(StudyError) as caught:
+        load_study(path, "stiff")
+    line = len(path.read_text(encoding="utf-8").splitlines())
+    assert caught.value.problems[0].place == f"{path}:{line}: scale.stiff.{place}"
+    assert problem in caught.value.problems[0].problem
 
 
 def test_a_case_outside_what_is_physical_is_refused(write_study: WriteStudy) -> None:
