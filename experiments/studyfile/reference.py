@@ -59,11 +59,7 @@ def study_reference() -> tuple[Row, ...]:
     return (
         Row("", "material", "text", meaning="Material card whose sections hold where the study lacks them."),
         *_rows(Study, ""),
-        Row(
-            "[scale.NAME]",
-            "",
-            meaning="Sections that differ at a scale, merged over the rest; factor.NAME changes one [[factor]].",
-        ),
+        Row("[scale.NAME]", "", meaning="Sections that differ at a scale; factor.NAME changes a factor."),
     )
 
 
