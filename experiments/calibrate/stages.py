@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import pandas as pd
@@ -27,10 +28,17 @@ from experiments.calibrate.results import (
 )
 from experiments.calibrate.screening_stage import analyse_screening, plan_screening, screening_design
 from experiments.calibrate.selection_stage import require_kept, select_factors
-from experiments.calibrate.surface_stage import explore_surface, require_slope
+from experiments.calibrate.surface_stage import (
+    Box,
+    climbed_box,
+    explore_surface,
+    fixed_box,
+    plan_surface,
+    require_slope,
+)
 from experiments.calibrate.target_stage import plan_target, settle_target
 from experiments.calibrate.values import p_text, quantity, worded
-from experiments.calibrate.verification_stage import verify
+from experiments.calibrate.verification_stage import plan_verification, verify
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
 
@@ -49,7 +57,9 @@ def calibrate(study: Study, runner: Runner, on_stage: StageHook | None = None) -
         Simulates all rows of a table at once, each in its ``scene``, and returns them with ``status``,
         ``reason`` and observables, NaN where there is no value; a case that fails is a row,
         never an exception. Called once for the target, the noise floor and the screening together, then once
-        for each batch of the climb, for the surface and for the verification.
+        for each batch of the climb, for the surface and for the verification. Where the study fixes the
+        design, cases of later stages come with an earlier call too, and again with their own: a runner
+        remembers what it simulated.
     on_stage
         Called with the name and the result of every finished stage.
 
@@ -89,15 +99,23 @@ class _Record:
     def __init__(self, runner: Runner, on_stage: StageHook | None, responses: Sequence[Response]) -> None:
         self.stages: dict[str, Any] = {}
         self.tables: list[pd.DataFrame] = []
+        self.ahead: list[pd.DataFrame] = []
+        """Cases of later stages that the next batch simulates too."""
         self.responses = tuple(responses)
         """Responses that are matched."""
         self._runner, self._on_stage = runner, on_stage
 
     def run(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Simulate a table of cases and remember them."""
-        cases = with_combinations(self._runner(table), self.responses)
-        self.tables.append(cases)
-        return cases
+        """Simulate a table of cases, and those ahead with it, and remember the table's."""
+        if self.ahead:
+            self._runner(pd.concat([table, *self.ahead], ignore_index=True))
+            self.ahead = []
+        self.tables.append(self.look(table))
+        return self.tables[-1]
+
+    def look(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Simulate a table of cases before their stage."""
+        return with_combinations(self._runner(table), self.responses)
 
     def match(self, responses: Sequence[Response]) -> pd.DataFrame:
         """Match other responses from now on; return the cases of the last table with their columns."""
@@ -119,24 +137,48 @@ def _run(study: Study, record: _Record) -> tuple[Outcome, str]:
     settings, response = study.campaign.selection, study.target.leading
     selection = record.keep("selection", select_factors(settings, screening, noise, response))
     require_kept(study, selection)
+    box = fixed_box(study, selection.kept)
+    early = _early_optimum(study, box, target, record)
+    record.ahead = [plan_verification(study, early)] if early else []
     path = climb(study, screening, selection.kept, noise, target, record.run)
     require_crossing(study, record.keep("climb", path), target)
-    surface = record.keep("surface", explore_surface(study, path, record.run))
+    box = box or climbed_box(study, path)
+    surface = record.keep("surface", explore_surface(study, box, record.run))
     require_slope(study, surface, path)
     if fidelity := study.campaign.fidelity:
         moved = carry_surface(study, fidelity, path, surface, target, record.run)
         surface = record.stages["surface"] = with_carried(surface, record.keep("fidelity", moved))
-    optimum = record.keep("optimum", find_optimum(study, surface, target))
+    optimum = record.keep("optimum", early or find_optimum(study, surface, target))
     verification = record.keep("verification", verify(study, optimum, target, record.run))
     return _verdict(study, optimum, verification)
+
+
+def _early_optimum(
+    study: Study, box: Box | None, target: TargetResult, record: _Record
+) -> OptimumResult | None:
+    """Find the optimum before the climb where it needs none, so that both stages simulate together.
+
+    None where it needs the climb, or where the campaign ends before it, as it will say in its order.
+    """
+    if box is None or study.campaign.fidelity:
+        return None
+    with suppress(StageEnd):
+        surface = explore_surface(study, box, record.look)
+        if surface.leading.reduced.terms:
+            return find_optimum(study, surface, target)
+    return None
 
 
 def _open(study: Study, record: _Record) -> tuple[Study, TargetResult, NoiseFloorResult, ScreeningResult]:
     """Run the stages that wait for nothing, in one batch: a twin's target, the noise floor, the screening.
 
+    With them run the cases of a surface that the study fixes. They are in no result if a stage before the
+    surface ends the campaign, for which these stages or the climb must lack nearly all their values.
+
     The study goes on with fewer responses where it has a profile.
     """
     design = screening_design(study.factors, study.campaign.screening)
+    record.ahead = plan_ahead(study)
     *hidden, _, screening_cases = _by_stage(record.run(plan_opening(study, design)))
     study, samples = with_directions(study, design, screening_cases, hidden)
     *hidden, noise_cases, screening_cases = _by_stage(record.match(study.target.responses))
@@ -157,6 +199,14 @@ def plan_opening(study: Study, design: Design) -> pd.DataFrame:
     if study.target.twin is not None:
         plans = [plan_target(study), *plans]
     return pd.concat(plans, ignore_index=True)
+
+
+def plan_ahead(study: Study) -> list[pd.DataFrame]:
+    """Lay out the cases of the surface if the study fixes its factors, centre and half-ranges."""
+    keep = study.campaign.selection.keep or ()
+    kept = [factor.name for factor in study.factors if factor.name in keep]
+    box = fixed_box(study, kept)
+    return [plan_surface(study, box)[1]] if box else []
 
 
 def _verdict(study: Study, optimum: OptimumResult, verification: VerificationResult) -> tuple[Outcome, str]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -41,23 +43,59 @@ from experiments.studyfile.campaign import Response, SurfaceSettings
 
 STAGE = "surface"
 
+FIXED = "The study fixes the {} of the composite design."
+"""Rule of a centre or half-ranges that the study fixes."""
+
 ROUNDING = 1e-12
 """A shrunk design keeps this share of its half-range away from a limit, so that rounding cannot cross it."""
 
 
-def explore_surface(study: Study, climb: ClimbResult, runner: Runner) -> SurfaceResult:
-    """Simulate the composite design and fit every response's surfaces; StageEnd with too few runs left."""
-    settings, responses = study.campaign.surface, study.target.fitted
-    kept = kept_factors(study, climb.kept)
-    center, half_range, decisions = _place(study, climb)
-    factors = tuple(Factor.around(f.name, center[f.name], half_range[f.name], f.unit) for f in kept)
+_Chosen: TypeAlias = tuple[dict[str, float], str]
+"""Values by factor, and the rule that chose them."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """Centre and half-ranges of the composite design, in natural units, and the decisions for them."""
+
+    center: dict[str, float]
+    half_range: dict[str, float]
+    decisions: tuple[Decision, ...]
+
+
+def fixed_box(study: Study, kept: Iterable[str]) -> Box | None:
+    """Return the box of kept factors if the study fixes all of it, so that it needs no climb; else None."""
+    settings = study.campaign.surface
+    center, half_range = (fixed_values(each, kept) for each in (settings.center, settings.half_range))
+    if not (center and half_range):
+        return None
+    return _place(study, (center, FIXED.format("centre")), (half_range, FIXED.format("half-ranges")))
+
+
+def climbed_box(study: Study, climb: ClimbResult) -> Box:
+    """Place the box by the climb, or by what the study fixes of it."""
+    settings, kept = study.campaign.surface, kept_factors(study, climb.kept)
+    return _place(study, _center(settings, climb), _half_range(settings, climb, kept))
+
+
+def plan_surface(study: Study, box: Box) -> tuple[Design, pd.DataFrame]:
+    """Make the composite design in a box, and lay out its cases."""
+    settings, kept = study.campaign.surface, kept_factors(study, box.center)
+    factors = tuple(Factor.around(f.name, box.center[f.name], box.half_range[f.name], f.unit) for f in kept)
     design = central_composite(factors, settings.alpha, settings.center_points)
     # The centre is replicated by its own rows.
     at_center = (design.coded == 0.0).all(axis=1)
     replicates = {int(run): 1 if central else settings.replicates for run, central in at_center.items()}
-    cases = runner(plan_cases(study, STAGE, design.natural, replicates, responses))
-    outside = _outside_ranges(kept, design)
-    decisions.append(_design_decision(design, settings, outside, cases, responses))
+    return design, plan_cases(study, STAGE, design.natural, replicates, study.target.fitted)
+
+
+def explore_surface(study: Study, box: Box, runner: Runner) -> SurfaceResult:
+    """Simulate the composite design and fit every response's surfaces; StageEnd with too few runs left."""
+    settings, responses = study.campaign.surface, study.target.fitted
+    design, table = plan_surface(study, box)
+    cases = runner(table)
+    outside = _outside_ranges(kept_factors(study, box.center), design)
+    decisions = [*box.decisions, _design_decision(design, settings, outside, cases, responses)]
     found = {}
     for response in responses:
         full = _fit(design, cases, response)
@@ -65,7 +103,7 @@ def explore_surface(study: Study, climb: ClimbResult, runner: Runner) -> Surface
         values = _run_means(response_table(cases, response, design.coded.index.tolist()))
         found[response.name] = FittedResponse(values, full, reduced)
         decisions.append(_fit_decision(response, full, reduced, rule, settings))
-    return SurfaceResult(found, cases, design, center, half_range, outside, tuple(decisions))
+    return SurfaceResult(found, cases, design, box.center, box.half_range, outside, tuple(decisions))
 
 
 def require_slope(study: Study, result: SurfaceResult, climb: ClimbResult) -> None:
@@ -83,40 +121,34 @@ def require_slope(study: Study, result: SurfaceResult, climb: ClimbResult) -> No
         )
 
 
-def _place(study: Study, climb: ClimbResult) -> tuple[dict[str, float], dict[str, float], list[Decision]]:
-    """Choose centre and half-ranges, fitted into the hard physical limits, and say why."""
-    settings, kept = study.campaign.surface, kept_factors(study, climb.kept)
-    center, center_rule = _center(settings, climb)
-    half_range, half_rule = _half_range(settings, climb, kept)
+def _place(study: Study, placed: _Chosen, sized: _Chosen) -> Box:
+    """Fit centre and half-ranges into the hard physical limits, and say why they were chosen."""
+    (center, center_rule), (half_range, half_rule) = placed, sized
+    settings, kept = study.campaign.surface, kept_factors(study, center)
     coded = central_composite(kept, settings.alpha, settings.center_points).coded
     reach = float(coded.abs().to_numpy().max())
     fitted = {
         name: fit_inside(center[name], half_range[name], reach, *study.limits.get(name, UNLIMITED))
-        for name in climb.kept
+        for name in center
     }
     new_center = {name: value for name, (value, _) in fitted.items()}
     new_half = {name: value for name, (_, value) in fitted.items()}
-    moved = [
-        n for n in climb.kept if not math.isclose(new_center[n], center[n], abs_tol=1e-9 * half_range[n])
-    ]
-    shrunk = [n for n in climb.kept if not math.isclose(new_half[n], half_range[n])]
+    moved = [n for n in center if not math.isclose(new_center[n], center[n], abs_tol=1e-9 * half_range[n])]
+    shrunk = [n for n in center if not math.isclose(new_half[n], half_range[n])]
     note = f" Moved into the physical limits: {', '.join(moved)}." if moved else ""
     shrink = f" Shrunk to stay inside the physical limits: {', '.join(shrunk)}." if shrunk else ""
     centers, halves = numbered_values("center", new_center), numbered_values("half-range", new_half)
-    return (
-        new_center,
-        new_half,
-        [
-            Decision(STAGE, center_rule, centers, f"Centre: {listed(new_center)}.{note}"),
-            Decision(STAGE, half_rule, halves, f"Half-ranges: {listed(new_half)}.{shrink}"),
-        ],
+    decisions = (
+        Decision(STAGE, center_rule, centers, f"Centre: {listed(new_center)}.{note}"),
+        Decision(STAGE, half_rule, halves, f"Half-ranges: {listed(new_half)}.{shrink}"),
     )
+    return Box(new_center, new_half, decisions)
 
 
-def _center(settings: SurfaceSettings, climb: ClimbResult) -> tuple[dict[str, float], str]:
+def _center(settings: SurfaceSettings, climb: ClimbResult) -> _Chosen:
     fixed = fixed_values(settings.center, climb.kept)
     if fixed is not None:
-        return fixed, "The study fixes the centre of the composite design."
+        return fixed, FIXED.format("centre")
     if settings.center_rule == "smallest-error" or climb.crossing is None:
         return climb.best, "The composite design is centred at the climb's step with the smallest error."
     return (
@@ -125,12 +157,10 @@ def _center(settings: SurfaceSettings, climb: ClimbResult) -> tuple[dict[str, fl
     )
 
 
-def _half_range(
-    settings: SurfaceSettings, climb: ClimbResult, kept: tuple[Factor, ...]
-) -> tuple[dict[str, float], str]:
+def _half_range(settings: SurfaceSettings, climb: ClimbResult, kept: tuple[Factor, ...]) -> _Chosen:
     fixed = fixed_values(settings.half_range, climb.kept)
     if fixed is not None:
-        return fixed, "The study fixes the half-ranges of the composite design."
+        return fixed, FIXED.format("half-ranges")
     least = settings.half_range_least
     values = {factor.name: max(abs(climb.step[factor.name]), least * factor.half_range) for factor in kept}
     rule = f"A half-range is one climb step, at least {least:g} of the factor's screening half-range."

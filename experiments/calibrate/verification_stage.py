@@ -14,14 +14,19 @@ from experiments.studyfile.campaign import Response
 STAGE = "verification"
 
 
+def plan_verification(study: Study, optimum: OptimumResult) -> pd.DataFrame:
+    """Lay out fresh cases at the chosen point, in every scene that measures a response."""
+    point, count = pd.DataFrame([optimum.settings], index=[1]), study.campaign.verification.replicates
+    return plan_cases(study, STAGE, point, count, study.target.responses)
+
+
 def verify(study: Study, optimum: OptimumResult, target: TargetResult, runner: Runner) -> VerificationResult:
     """Simulate the chosen point with fresh seeds; test every response for a difference and for equivalence.
 
     The level of the tests is shared among the responses (Bonferroni). StageEnd with fewer than two values.
     """
     settings, responses = study.campaign.verification, study.target.responses
-    point = pd.DataFrame([optimum.settings], index=[1])
-    cases = runner(plan_cases(study, STAGE, point, settings.replicates, responses))
+    cases = runner(plan_verification(study, optimum))
     alpha = settings.alpha / len(responses)
     tests = {}
     for response in responses:

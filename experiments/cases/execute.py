@@ -194,6 +194,7 @@ def run_cases(
     workers: Workers = THIS_MACHINE,
     progress: OnProgress | None = None,
     notes: CaseNotes | None = None,
+    measured: dict[str, dict[str, Any]] | None = None,
 ) -> pd.DataFrame:
     """Simulate every case of a table that is not stored yet, all at once, and measure every heap.
 
@@ -213,6 +214,8 @@ def run_cases(
         Called with the progress now and then.
     notes
         Takes notes of the cases while they run.
+    measured
+        What earlier calls for this study measured, by the keys of the cases; this call adds to it.
 
     Returns
     -------
@@ -231,6 +234,8 @@ def run_cases(
     keys = [store.key(case) if case else "" for case in cases]
     by_key = {key: case for key, case in zip(keys, cases, strict=True) if case}
     scenes = dict(zip(keys, _scene_names(table), strict=True))
+    outcomes = {} if measured is None else measured
+    new = {key: case for key, case in by_key.items() if key not in outcomes}
 
     def given(key: str) -> tuple[MeasurementSection, bool]:
         return study.measurement, study.scenes[scenes[key]].leaves_a_heap
@@ -242,11 +247,11 @@ def run_cases(
     if notes:
         names = [case_name(case) if case else "" for case in cases]
         notes.planned(table.assign(case_key=keys), names)
-    with CaseRunner(store, _measured, workers, store.engine, len(by_key)) as runner:
-        outcomes = runner.run(_missing(by_key, store), given, progress, note)
+    with CaseRunner(store, _measured, workers, store.engine, len(new)) as runner:
+        outcomes |= runner.run(_missing(new, store), given, progress, note)
         stored = {
             key: runner.submit(_stored_outcome, store.folder, key, *given(key))
-            for key in by_key.keys() - outcomes.keys()
+            for key in new.keys() - outcomes.keys()
         }
         for key, outcome in stored.items():
             outcome.add_done_callback(partial(note, key))

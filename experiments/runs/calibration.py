@@ -63,7 +63,7 @@ def run_calibration(prepared: Prepared, on_stage: StageHook | None = None) -> Ca
 
 def run_campaign(run: Run, on_stage: StageHook | None = None) -> Campaign:
     """Run the campaign of an open run, and publish its report."""
-    cheaper = replace(run, study=cheaper_study(run.study))
+    cheaper = replace(run, study=cheaper_study(run.study), measured={})
 
     def simulate(table: pd.DataFrame) -> pd.DataFrame:
         own = table["stage"].isin(OWN_SCALE) if run.study.campaign.fidelity else table["stage"].notna()

@@ -15,7 +15,7 @@ from doe import central_composite
 from doe.discrepancy import bank_points
 from experiments.calibrate.fidelity_stage import further_runs
 from experiments.calibrate.screening_stage import screening_design
-from experiments.calibrate.stages import plan_opening
+from experiments.calibrate.stages import plan_ahead, plan_opening
 from experiments.cases import Resources
 from experiments.cases.forecast.speed import UNKNOWN, forecast, source_of
 from experiments.cases.forecast.work import rest_of, work_of
@@ -97,22 +97,27 @@ def plan_calibration(prepared: Prepared) -> Plan:
 def _campaign_stages(study: Study) -> list[_Stage]:
     """Return the stages, with the usual number of kept factors and steps of the climb."""
     settings, target, cheaper = study.campaign, study.target, cheaper_study(study)
-    opening = plan_opening(study, screening_design(study.factors, settings.screening))
+    ahead = plan_ahead(study)
+    opening = pd.concat([plan_opening(study, screening_design(study.factors, settings.screening)), *ahead])
     scenes = scenes_of(target.fitted)
     own, middle = ([one.case({}, 1, scene) for scene in scenes] for one in (study, cheaper))
     steps = settings.climb.steps * settings.climb_replicates
     kept = len(settings.selection.keep or ()) or min(settings.selection.at_most, len(study.factors))
     surface = _surface_cases(study, kept) * len(scenes)
+    leading = study.case({}, 1, target.leading.scene)
+    most = steps * (1 + settings.climb.extensions)
     fresh = settings.verification.replicates * len(scenes_of(target.responses))
     moving = further_runs(settings.fidelity, steps, kept) * len(scenes) if settings.fidelity else 0
     at_own = [("runs at this scale", own, moving, moving)] if moving else []
-    return [
-        ("target, noise floor, screening", _sampled(cheaper, opening), len(opening), len(opening)),
-        ("climb", [study.case({}, 1, target.leading.scene)], steps, steps * (1 + settings.climb.extensions)),
-        ("surface", middle, surface, surface),
-        *at_own,
-        ("verification", own, fresh, fresh),
-    ]
+    first = "target, noise floor, screening" + (", surface" if ahead else "")
+    stages: list[_Stage] = [(first, _sampled(cheaper, opening), len(opening), len(opening))]
+    if ahead and not at_own:
+        some = [leading] * steps + own * settings.verification.replicates
+        return [*stages, ("climb, verification", some, steps + fresh, most + fresh)]
+    stages.append(("climb", [leading], steps, most))
+    if not ahead:
+        stages.append(("surface", middle, surface, surface))
+    return [*stages, *at_own, ("verification", own, fresh, fresh)]
 
 
 def _surface_cases(study: Study, kept: int) -> int:

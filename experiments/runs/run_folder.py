@@ -62,6 +62,8 @@ class Run:
     watch: Watch
     simulated: list[float] = field(default_factory=list)
     """Time from the start of each batch to its last progress [s]."""
+    measured: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Measurements of the study's cases so far, by their keys."""
 
     @property
     def is_by_hand(self) -> bool:
@@ -111,7 +113,8 @@ class Run:
 
             return typed_cases(self.study, table, self.folder, title, self.store)
         with self.batch(title, lambda: len(self.store)) as progress:
-            return run_cases(self.study, table, self.store, self.workers, progress, self.journal)
+            more = (self.workers, progress, self.journal, self.measured)
+            return run_cases(self.study, table, self.store, *more)
 
     def publishing(self, **made_from: object) -> AbstractContextManager[Path]:
         """Folder for drafts of outputs, which take their places when the block ends well."""

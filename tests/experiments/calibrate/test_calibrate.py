@@ -11,7 +11,7 @@ import pytest
 from analytic_heaps import NOISE, AnalyticHeaps, Angle, StandInStudy, settings
 
 from doe import Factor, Sample
-from experiments.calibrate import Campaign, ClimbEnd, Outcome, calibrate
+from experiments.calibrate import Campaign, ClimbEnd, Outcome, calibrate, stages
 from experiments.calibrate.results import STAGES
 from experiments.studyfile.campaign import Response, Target, Twin
 
@@ -284,6 +284,55 @@ def test_a_few_failed_cases_are_stated_and_do_not_stop_the_campaign() -> None:
     assert stated == ["noise_floor", "screening", "climb", "surface", "verification"]
 
 
+FIXED = {
+    "selection": {"keep": ["E", "F"]},
+    "surface": {"center": {"E": 0.48, "F": 0.40}, "half_range": {"E": 0.10, "F": 0.15}},
+}
+"""Decisions that leave nothing of the composite design to the climb."""
+
+
+def batches(heaps: AnalyticHeaps) -> int:
+    """Count the calls with new cases: the others ask for what was simulated."""
+    seeds = [set(table["seed"]) for table in heaps.tables]
+    return sum(not one <= set().union(*seeds[:number]) for number, one in enumerate(seeds))
+
+
+@pytest.mark.parametrize(
+    ("decisions", "goal", "fails", "apart", "joined", "lost"),
+    [
+        pytest.param(FIXED, 26.0, "", 4, 2, 0, id="all that is fixed comes first"),
+        pytest.param({"surface": FIXED["surface"]}, 26.0, "", 4, 3, 0, id="the screening selects"),
+        pytest.param(FIXED, 30.2, "", 5, 3, 0, id="the climb is extended"),
+        pytest.param({"selection": FIXED["selection"]}, 26.0, "", 4, 4, 0, id="the climb places the design"),
+        # The thirteen cases of a design of two factors, and the five of the verification, are the cost.
+        pytest.param(FIXED, 26.0, "screening", 1, 1, 13, id="the opening fails"),
+        pytest.param(FIXED, 26.0, "climb", 2, 2, 18, id="the climb fails"),
+        pytest.param(FIXED, 26.0, "surface", 3, 2, 0, id="the design fails"),
+    ],
+)
+def test_cases_that_are_certain_join_an_earlier_batch_and_change_no_result(
+    decisions: Mapping,
+    goal: float,
+    fails: str,
+    apart: int,
+    joined: int,
+    lost: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def campaign() -> tuple[Campaign, AnalyticHeaps]:
+        heaps = AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == fails)
+        return calibrate(analytic_study(measured(goal, 0.4), **decisions), heaps), heaps
+
+    (early, ahead), _ = campaign(), monkeypatch.setattr(stages, "fixed_box", lambda *_: None)
+    late, one_by_one = campaign()
+    assert json.dumps(early.to_dict()) == json.dumps(late.to_dict())
+    assert {name: table.to_csv() for name, table in early.tables().items()} == {
+        name: table.to_csv() for name, table in late.tables().items()
+    }
+    assert (batches(one_by_one), batches(ahead)) == (apart, joined)
+    assert len(set().union(*[table["seed"] for table in ahead.tables])) == len(early.cases) + lost
+
+
 def test_points_stay_inside_hard_limits_and_leave_stated_ranges_openly() -> None:
     surface = {"center": {"E": 0.46, "F": 0.05}, "half_range": {"E": 0.15, "F": 0.08}}
     study = analytic_study(measured(15.0, 0.5), surface=surface)
@@ -304,15 +353,15 @@ def test_points_stay_inside_hard_limits_and_leave_stated_ranges_openly() -> None
 
 
 def test_results_are_plain_finite_json_and_tables() -> None:
-    stages: list[str] = []
+    names: list[str] = []
     campaign = calibrate(
         analytic_study(hidden(E=0.5, F=0.42)),
         AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == "climb" and row["run"] == 1),
-        on_stage=lambda name, result: stages.append(name),
+        on_stage=lambda name, result: names.append(name),
     )
     kept = json.loads(json.dumps(campaign.to_dict(), allow_nan=False))
     assert (kept["outcome"], kept["climb"]["path"][0]["mean"]) == (campaign.outcome.value, None)
-    assert stages == list(STAGES[:-1])
+    assert names == list(STAGES[:-1])
     tables = campaign.tables()
     assert all(len(tables[name]) == len(getattr(campaign, name)) for name in ("cases", "decisions"))
     assert list(tables["surface_anova_full"].iloc[:, 1])[:1] == ["model"]

@@ -19,7 +19,7 @@ from experiments.calibrate.results import (
 )
 from experiments.calibrate.screening_stage import analyse_screening
 from experiments.calibrate.selection_stage import select_factors
-from experiments.calibrate.surface_stage import explore_surface
+from experiments.calibrate.surface_stage import climbed_box, explore_surface
 from experiments.calibrate.target_stage import settle_target
 from experiments.calibrate.verification_stage import verify
 from experiments.studies.buckwheat.paper import factors, published
@@ -113,7 +113,7 @@ def path(
 
 @pytest.fixture(scope="module")
 def surface(study: StandInStudy, path: ClimbResult) -> SurfaceResult:
-    return explore_surface(study, path, composite_runner)
+    return explore_surface(study, climbed_box(study, path), composite_runner)
 
 
 def test_the_screening_keeps_the_two_static_frictions(selection: SelectionResult) -> None:

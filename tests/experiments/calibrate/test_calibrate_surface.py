@@ -14,7 +14,7 @@ from experiments.calibrate import ClimbEnd, Outcome
 from experiments.calibrate.cases import StageEnd
 from experiments.calibrate.optimum_stage import find_optimum
 from experiments.calibrate.results import ClimbResult, SurfaceResult, TargetResult
-from experiments.calibrate.surface_stage import explore_surface, require_slope
+from experiments.calibrate.surface_stage import climbed_box, explore_surface, require_slope
 from experiments.studyfile.campaign import Response, Target
 
 CENTER = {"E": 1.0, "F": 1.0}
@@ -40,7 +40,8 @@ def explored(slope: float, step: float = 0.1, **decisions: Mapping) -> SurfaceRe
         angle = 20.0 + slope * (table["E"] + table["F"] - 2.0) / HALF_RANGE + noise
         return table.assign(status="finished", reason="", angle=angle)
 
-    return explore_surface(plane_study(**decisions), crossed_climb(step), heaps)
+    study = plane_study(**decisions)
+    return explore_surface(study, climbed_box(study, crossed_climb(step)), heaps)
 
 
 def crossed_climb(step: float = 0.1) -> ClimbResult:

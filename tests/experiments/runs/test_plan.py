@@ -51,6 +51,17 @@ def test_a_calibration_is_planned_and_nothing_is_written(write_study: Write, tmp
     assert plan["disk"] > 0
 
 
+def test_cases_that_a_study_fixes_are_planned_in_the_batch_they_run_in(write_study: Write) -> None:
+    fixed = 'selection.keep = ["E"]\nsurface.half_range = { E = 0.1 }\n'
+    open_, all_fixed = (
+        planned("calibrate", write_study(add=f"[campaign]\n{fixed}{more}"))
+        for more in ("", "surface.center = { E = 0.5 }\n")
+    )
+    names = [batch["name"] for batch in all_fixed["batches"]]
+    assert names == ["target, noise floor, screening, surface", "climb, verification", "start, report"]
+    assert (all_fixed["cases"], all_fixed["most"]) == (open_["cases"], open_["most"])
+
+
 def test_a_plan_reads_well(write_study: Write, tmp_path: Path) -> None:
     code, out, _ = dem_warp("calibrate", write_study(), "--device", "cpu", "--workers", 2, "--dry-run")
     assert code == 0

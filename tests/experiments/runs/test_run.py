@@ -18,7 +18,7 @@ from cone_engine import stand_in
 from dem_warp import Case, CaseResult, Progress
 from doe.discrepancy import Outcomes, bank_points, make_bank
 from experiments import api
-from experiments.calibrate import Campaign, Outcome
+from experiments.calibrate import Campaign, Outcome, stages
 from experiments.calibrate.stages import StageHook
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.store.outputs import LIST, sha256_of
@@ -87,16 +87,15 @@ def test_a_campaign_leaves_its_report_results_and_tables(
     study: Study, engine: Engine, tmp_path: Path
 ) -> None:
     folder = tmp_path / "out"
-    stages: list[str] = []
-    campaign = run_campaign(study, folder, on_stage=lambda name, _: stages.append(name))
+    names: list[str] = []
+    campaign = run_campaign(study, folder, on_stage=lambda name, _: names.append(name))
     assert campaign.outcome == Outcome.CALIBRATED
     assert campaign.optimum is not None
     # The fit of a line to heaps that scatter by 0.2 degrees.
     assert campaign.optimum.point["E"] == pytest.approx(0.5, abs=0.3 / SLOPE)
-    assert stages[0] == "target"
-    assert stages[-1] == "verification"
-    names = "report.html results.json study.json tables cases wall_times.csv material.toml files.json"
-    assert {*names.split(), ".live", ".lock"} == {path.name for path in folder.iterdir()}
+    assert (names[0], names[-1]) == ("target", "verification")
+    files = "report.html results.json study.json tables cases wall_times.csv material.toml files.json"
+    assert {*files.split(), ".live", ".lock"} == {path.name for path in folder.iterdir()}
     results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     assert results["campaign"]["outcome"] == "calibrated"
     assert len(list((folder / "cases").iterdir())) == len(engine.seeds) == len(campaign.cases)
@@ -157,6 +156,35 @@ def test_a_finished_campaign_simulates_nothing_and_another_replicate_only_that(
     assert second.noise_floor is not None
     pd.testing.assert_frame_equal(second.noise_floor.cases.iloc[:5], first.noise_floor.cases)
     assert len(engine.seeds) == count + 1
+
+
+FIXED = """
+[campaign]
+noise_floor.replicates = 5
+selection.keep = ["E"]
+surface.center = { E = 0.5 }
+surface.half_range = { E = 0.1 }
+"""
+"""Decisions that leave nothing of the composite design to the climb."""
+
+
+@pytest.mark.usefixtures("_without_report")
+def test_cases_of_later_stages_that_are_certain_run_earlier_and_each_once(
+    write_study: Callable[..., Path], engine: Engine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = load_study(write_study(add=FIXED))
+    early = run_campaign(study, tmp_path / "early")
+    assert len(engine.seeds) == len(set(engine.seeds)) == len(early.cases)
+    monkeypatch.setattr(stages, "fixed_box", lambda *_: None)
+    assert same_findings(early, run_campaign(study, tmp_path / "late"))
+    titles = [
+        pd.read_csv(tmp_path / name / run_folder.WALL_TIMES_FILE)["stage"].tolist()
+        for name in ("late", "early")
+    ]
+    assert titles == [
+        ["noise floor, screening", "climb", "surface", "verification"],
+        ["noise floor, screening, surface", "climb, verification"],
+    ]
 
 
 def leave_bank(study: Study, folder: Path, table: bool = True) -> None:
