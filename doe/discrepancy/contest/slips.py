@@ -41,6 +41,8 @@ FACTORS = (1000.0, 100.0, 60.0, 25.4, 10.0, 3.0, 2.0, -1.0)
 """Usual factors: of units, of an inch, of a digit, of a sign; their inverses as well."""
 NEAR = 0.15
 """Relative distance up to which a factor is recognised."""
+SCATTERS = 6.0
+"""Ratio of a measured to a modelled variance up to which columns may be exchanged: it varies with factors."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +58,17 @@ class Slip:
     factor: float | None
     """Factor by which the values seem multiplied; None where no usual factor fits."""
     exchanged: bool
-    """True if the two conditions seem exchanged."""
+    """True if the two conditions, or the two observables, seem exchanged."""
     q_with: float
     q_without: float
     """Least Q of the base and the base with one mechanism, with these values and without them; for an outlier
     its squared distance from the others in standard deviations, and 0."""
+
+    @property
+    def is_open(self) -> bool:
+        """True if an effect that acts on these observables alone would look the same."""
+        plain = self.factor is None or 0.25 < self.factor < 4.0  # an effect may well double an observable
+        return self.replicate is None and len(self.conditions) > 1 and plain and not self.exchanged
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +109,11 @@ def find_slips(measured: Measured, emulator: Emulator, settings: Settings) -> tu
         whole = _closest(rest, emulator, settings)
         if whole is None or whole.q < GROSS * whole.freedom:
             return tuple(found)  # a mechanism may explain it
-        tried = [*_exchanges(rest, emulator, settings, whole), *_left_out(rest, emulator, settings, whole)]
+        ways = _exchanges, _swaps, _left_out
+        tried = [one for way in ways for one in way(rest, emulator, settings, whole)]
         if fitting := [one for one in tried if one.ratio < FITS]:
             best = min(fitting, key=lambda one: (one.cost, one.ratio))
-            return _joined(found, [best.slip])
+            return _joined(found, [_confirmed(best.slip, rest, emulator, settings)])
         if both := _two_kinds(rest, emulator, settings, whole):
             return _joined(found, both)
         least = HELPS * whole.q / whole.freedom
@@ -206,6 +215,46 @@ def _exchanges(measured: Measured, emulator: Emulator, settings: Settings, whole
         if fitted is not None:
             slip = Slip(measured.observables, (first, second), None, None, True, whole.q, fitted.q)
             yield _Tried(slip, fitted, 1)
+
+
+def _swaps(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> Iterator[_Tried]:
+    """Try the pair of observables that promises most, exchanged in all conditions."""
+    scouted = []
+    base = Model(emulator, (), settings.systematic, views=measured.views)
+    for pair in combinations([name for name in measured.observables if name in emulator.observables], 2):
+        swap = dict(zip(pair, pair[::-1], strict=True))
+        columns = [measured.observables.index(swap.get(name, name)) for name in measured.observables]
+        values = {name: rows[:, columns] for name, rows in measured.values.items()}
+        swapped = replace(measured, values=values)
+        if all(_scatters_so(swapped, emulator, name) for name in pair):
+            evidence = gather(swapped, emulator)
+            stack = Stack(base, (*evidence.training, *evidence.held_out))
+            scouted.append((quick_q(stack, whole.x[: len(base.lower)]), pair, swapped))
+    for _, best, swapped in sorted(scouted, key=lambda one: one[0])[:1]:
+        if fitted := _closest(swapped, emulator, settings):
+            yield _Tried(Slip(best, measured.conditions, None, None, True, whole.q, fitted.q), fitted, 1)
+
+
+def _scatters_so(measured: Measured, emulator: Emulator, name: str) -> bool:
+    """Return True if an observable scatters about as the model has it: more would hide any disagreement."""
+    center, ratios = np.zeros(len(emulator.space.factors)), []
+    for condition in (each for each in measured.conditions if each in emulator.surfaces):
+        values = measured.values[condition][:, measured.observables.index(name)]
+        own = emulator.surfaces[condition].noise.variance(center)[emulator.observables.index(name)]
+        if np.isfinite(values).sum() >= LEAST and own:
+            ratios.append(np.nanvar(values, ddof=1) / own)
+    return bool(ratios) and 1.0 / SCATTERS < np.mean(ratios) < SCATTERS
+
+
+def _confirmed(slip: Slip, measured: Measured, emulator: Emulator, settings: Settings) -> Slip:
+    """Keep a usual factor only if the values agree once they are divided by it."""
+    if slip.factor is None or len(slip.conditions) == 1:
+        return slip
+    wrong = np.where(np.isin(measured.observables, slip.observables), slip.factor, 1.0)
+    values = {name: rows / wrong for name, rows in measured.values.items()}
+    fitted = _closest(replace(measured, values=values), emulator, settings)
+    agrees = fitted is not None and fitted.q < FITS * fitted.freedom
+    return slip if agrees else replace(slip, factor=None)
 
 
 def _left_out(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> Iterator[_Tried]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from doe.discrepancy import CalibrationUse, Discovery, Fit, Question, Slip, Verdict
 from experiments.report.discovery.terms import Terms, spaced
-from experiments.report.kit.numbers import enumeration, trimmed
+from experiments.report.kit.numbers import capital, enumeration, trimmed
 from experiments.report.kit.sentences import say
 from experiments.studyfile.observables import Instrument
 
@@ -101,9 +101,16 @@ def slip_sentences(found: Discovery) -> Iterator[str]:
             yield say("misses.slip_of_values", slip=_slip(slip), q=q, q_without=q_without, after=after)
 
 
+def open_question(found: Discovery, text: str) -> str:
+    """Ask whether observables are misread or moved; empty where no slip is open."""
+    off = dict.fromkeys(name for slip in found.slips if slip.is_open for name in slip.observables)
+    return capital(say(text, names=enumeration(map(spaced, off)))) if off else ""
+
+
 def _slip(slip: Slip) -> str:
     if slip.exchanged:
-        return say("misses.exchanged", names=enumeration(slip.conditions))
+        two = slip.observables if len(slip.observables) == 2 else slip.conditions
+        return say("misses.exchanged", names=enumeration(map(spaced, two)))
     names, many = enumeration(map(spaced, slip.observables)), len(slip.observables) > 1
     heap = "" if slip.replicate is None else f"heap {slip.replicate} under {slip.conditions[0]}"
     if not heap and len(slip.conditions) == 1:
@@ -112,10 +119,11 @@ def _slip(slip: Slip) -> str:
     if heap:
         names, how = (heap, "is none of the others") if many else (f"{names} of {heap}", how)
         many = False
+    first = "Misread or moved" if slip.is_open else "A likely slip"
     if slip.factor is None:
-        return f"A likely slip: {names} {how}."
+        return f"{first}: {names} {how}."
     look = "look" if many else "looks"
-    return say("misses.factor", names=names, look=look, factor=trimmed(slip.factor, 3))
+    return say("misses.factor", first=first, names=names, look=look, factor=trimmed(slip.factor, 3))
 
 
 @dataclass(frozen=True)

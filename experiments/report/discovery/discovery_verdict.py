@@ -23,6 +23,7 @@ from experiments.report.discovery.disagreement import (
     leaning,
     measure_again,
     misses,
+    open_question,
     slip_decides,
     slip_sentences,
     standing_out,
@@ -52,7 +53,7 @@ def headline(found: Discovery, terms: Terms) -> str:
     """Say the verdict in a few words."""
     named = terms.titles(found.named)
     if slip_decides(found):
-        return "A likely slip in the data"
+        return open_question(found, "verdict.open") or "A likely slip in the data"
     return {
         Verdict.NONE: "Nothing is missing that these data could show",
         Verdict.NAMED: f"Missing: {named}",
@@ -114,7 +115,7 @@ def next_step(found: Discovery, terms: Terms) -> str:
     """Describe the next experiment; empty where none is proposed."""
     step, unknown = found.next_experiment, found.verdict is Verdict.UNKNOWN
     if slip_decides(found) or (found.slips and unknown and step is None):
-        return say("verdict.data_first")
+        return open_question(found, "verdict.read_again") or say("verdict.data_first")
     if step is None:
         return measure_again(found) if unknown else ""
     pair = " from ".join(

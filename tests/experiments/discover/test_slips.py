@@ -89,6 +89,32 @@ def test_one_value_typed_times_three_is_named_and_left_out() -> None:
     assert found.without_slips.verdict is Verdict.NONE
 
 
+def test_exchanged_columns_are_one_slip() -> None:
+    seen = heaps(3)
+    first, second = (seen.observables.index(name) for name in ("r90", "t55"))
+    for rows in seen.values.values():
+        rows[:, [first, second]] = rows[:, [second, first]]
+    [slip] = find_slips(seen, known(), SEARCH.settings)
+    assert (slip.observables, slip.exchanged, slip.is_open) == (("r90", "t55"), True, False)
+
+
+@pytest.mark.parametrize(("factor", "is_open"), [(10.0, False), (-1.0, False), (2.0, True), (5.0, True)])
+def test_an_observable_that_is_off_everywhere_is_open_unless_a_usual_factor_says_why(
+    factor: float, is_open: bool
+) -> None:
+    # an effect that acts on the fill alone may well double it; no effect turns its sign
+    [slip] = find_slips(times(heaps(3), ("fill_height",), factor), known(), SEARCH.settings)
+    assert (slip.observables, slip.is_open) == (("fill_height",), is_open)
+
+
+def test_an_effect_near_a_usual_factor_is_open_where_it_differs_between_conditions() -> None:
+    measured = heaps(3)
+    for rows, factor in zip(measured.values.values(), (6.0, 14.0, 10.0, 8.0, 12.0), strict=True):
+        rows[:, measured.observables.index("fill_height")] *= factor
+    [slip] = find_slips(measured, known(), SEARCH.settings)
+    assert (slip.factor, slip.is_open) == (None, True)
+
+
 def test_effects_are_no_slips() -> None:
     # Sizes at the end of their range: Q of the base is hundreds.
     at_end = [heaps(4, **{name: 1.0}) for name in SEARCH.space.names]

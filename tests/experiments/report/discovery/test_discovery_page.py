@@ -216,6 +216,26 @@ def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(whole_study: S
     assert "r50 and fill height look as if multiplied by 10" in verdict_sentence(gross, terms)
 
 
+def test_an_observable_that_is_off_everywhere_is_misread_or_moved(terms: Terms) -> None:
+    unknown, none = (made_discovery(v) for v in (Verdict.UNKNOWN, Verdict.NONE))
+    drag = Slip(("wall_drag",), none.data.conditions, None, None, False, 1496.0, 25.0)
+    found = replace(unknown, slips=(drag,), without_slips=none)
+    said = headline(found, terms)
+    assert said == "Wall drag: misread, or moved by an effect on nothing else; another instrument decides"
+    assert "Misread or moved: wall drag is far from all that the rest allows." in verdict_sentence(
+        found, terms
+    )
+    assert "measure the same in a few more heaps with another instrument" in next_step(found, terms)
+    both = replace(drag, observables=("t75", "t55"), factor=2.0)
+    assert headline(replace(found, slips=(both,)), terms).startswith("T75 and t55: misread, or")
+    # what a unit explains, or two columns exchanged, is a slip
+    for slip in (replace(drag, factor=1000.0), replace(both, factor=None, exchanged=True)):
+        assert headline(replace(found, slips=(slip,)), terms) == "A likely slip in the data"
+    assert "A likely slip: t75 and t55 look exchanged" in verdict_sentence(
+        replace(found, slips=(slip,)), terms
+    )
+
+
 def test_a_heap_that_is_none_of_the_others_is_told_once(terms: Terms) -> None:
     none = made_discovery(Verdict.NONE)
     heap = Slip(none.data.observables, ("wide",), 3, None, False, 254.0, 0.0)
