@@ -153,23 +153,16 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 def rescaled(
     document: Mapping[str, Any], over: Mapping[str, Any], places: Places
 ) -> tuple[dict[str, Any], Places]:
-    """Merge a scale over a document; its ``factor.NAME`` changes the factor of that name.
-
-    Raises
-    ------
-    StudyError
-        The study has no such factor, or what the scale says of it is no table.
-    """
+    """Merge a scale over a document; its ``factor.NAME`` changes the factor of that name, or is refused."""
     changes, rows = over.get("factor"), document.get("factor")
     if not isinstance(changes, Mapping) or not isinstance(rows, list):
         return merge(document, over), places
     names = [str(value_at(row, ("name",))) for row in rows]
     for name, change in changes.items():
+        place = places.of(("factor", name, *(list(change)[:1] if isinstance(change, Mapping) else ())))
         if not isinstance(change, Mapping):
-            place = places.of(("factor", name))
             raise StudyError(place, "must be a table", change, "Write e.g. low = 0.2 in it.")
         if name not in names:
-            place = places.of(("factor", name, *list(change)[:1]))
             raise StudyError(place, f"must name a factor, {nearest_name(name, names)}", name)
     merged = [merge(row, changes.get(name, {})) for name, row in zip(names, rows, strict=True)]
     return merge(document, {**over, "factor": merged}), places.numbered("factor", names)

@@ -52,13 +52,12 @@ class Places:
 
     def numbered(self, key: str, names: Sequence[str]) -> Places:
         """Find what the scale says of the tables of an array by their names by their numbers, too."""
-        lines, start = dict(self.lines), ("scale", self.scale or "", key)
-        for path, line in self.lines.items():
-            if path[:3] == start and len(path) > 3:
-                number = names.index(str(path[3]))
-                lines.setdefault((*start, number), line)
-                lines[(*start, number, *path[4:])] = line
-        return replace(self, lines=lines)
+        start = ("scale", self.scale or "", key)
+        own = [(path[3:], line) for path, line in self.lines.items() if path[:3] == start and path[3:]]
+        ends = [
+            ((names.index(str(name)), *rest), line) for (name, *inner), line in own for rest in ((), inner)
+        ]
+        return replace(self, lines={**self.lines, **{(*start, *end): line for end, line in ends}})
 
     def _name(self, line: int | None, path: KeyPath) -> str:
         where = str(self.file) if line is None else f"{self.file}:{line}"

@@ -14,14 +14,7 @@ from dem_warp.scenes.walled_scene import WalledScene
 from experiments.io.texts import nearest_name
 from experiments.studyfile.generated import EngineSection, LibrarySection, library_section
 
-_STRENGTHS = (
-    "friction_angle",
-    "cohesion",
-    "steady_angle",
-    "consolidation_stress",
-    "unconfined",
-    "flow_ratio",
-)
+_STRENGTHS = ("friction_angle", "cohesion", "steady_angle", "consolidation", "unconfined", "flow_ratio")
 _OF_FUNNEL = (*FLOW, "fill_height", "solid_fraction")
 
 ABSENT: tuple[tuple[str, Callable[[Any], bool], str, tuple[str, ...]], ...] = (
@@ -31,8 +24,7 @@ ABSENT: tuple[tuple[str, Callable[[Any], bool], str, tuple[str, ...]], ...] = (
     ("shear", lambda own: own.base == "smooth", "a rough base", _STRENGTHS),
     ("shear", lambda own: own.base == "rough", "a smooth base", ("wall_friction_angle",)),
 )
-"""Observables that a test does not have as it is set: its name, when, what they need, beginnings of
-their names."""
+"""Observables that a test lacks as it is set: its name, when, what they need, beginnings of their names."""
 
 
 class TestSection(EngineSection):
