@@ -15,7 +15,6 @@ from doe.curves.curve_emulator import CurveEmulator
 from doe.curves.curve_fit import MeasuredCurve, fit_curves
 from doe.discrepancy import Measured, Settings, settings_of
 from doe.errors import RuleError
-from doe.plots.joint_plots import joint_plot
 
 FACTORS = [Factor("A", 0.0, 1.0), Factor("B", 2.0, 5.0), Factor("C", -1.0, 1.0)]
 DESIGN = doe.central_composite(FACTORS)
@@ -84,7 +83,6 @@ RIGHT_VALUES: list[tuple[Any, str]] = [
     (POINT, "point points at to truth"),
     (SCREEN, "result steepest_path.fit"),
     (AGREED, "agreement_plot.result"),
-    (JOINT, "joint_plot.fit"),
     (PATH, "path"),
     (REGION, "region"),
     (TARGET, "Goal.target agrees.target"),
@@ -166,7 +164,6 @@ MEMBERS: list[tuple[Any, str]] = [
 FUNCTIONS: list[Callable] = [
     *PUBLIC,
     *DRAWN,
-    joint_plot,
     *(getattr(owner, name) for owner, names in MEMBERS for name in names.split()),
     lambda one, blocks: doe.join(CORNERS, one, blocks=blocks),
     lambda emulators, curves: fit_curves(emulators, [0.0], curves, 1.0, 1),
