@@ -17,6 +17,12 @@ LANGUAGES = {".toml": "toml", ".py": "python"}
 WRITTEN = re.compile(r"(Writing|Overwriting) \S+")
 """Words of IPython on a cell that is a file, whose name stands in the cell."""
 
+TABLE = re.compile(r"((?:^.*\n)?^┏.*\n(?:^[┃┡│├└].*\n?)+)", re.MULTILINE)
+"""A table with its title, apart from what is printed before and after it."""
+
+COLUMNS = re.compile(r"\S {3,}\S")
+"""Columns: they scroll where the page is narrow, and other text wraps."""
+
 STREAMS = ("stderr", "stream")
 """Classes of what a cell printed; the output stands before the errors, so it is put there last."""
 
@@ -37,9 +43,11 @@ def join_streams(app: Any, doctree: nodes.document) -> None:
             for chunk in chunks:
                 output.remove(chunk)
             if text and not WRITTEN.fullmatch(text):
-                first = chunks[0]
-                block = nodes.literal_block(text, text, language=first["language"], classes=first["classes"])
-                output.insert(0, block)
+                first, parts = chunks[0], [part.rstrip() for part in TABLE.split(text)]
+                for part in reversed(parts):
+                    classes = [*first["classes"], *(["table"] if COLUMNS.search(part) else [])]
+                    block = nodes.literal_block(part, part, language=first["language"], classes=classes)
+                    output.insert(0, block) if part else None
         if not output.children:
             output.parent.remove(output)
 

@@ -34,11 +34,11 @@ def show_plan(plan: Plan, as_json: bool) -> NoReturn:
     for doubt in plan.doubts:
         typer.echo(plain(f"Doubtful: {doubt}"))
     seconds, source = totals["seconds"], totals["source"]
-    what = "of each GPU" if plan.on_gpu else "of this machine"
-    typer.echo(f"Total: {totals['cases']:,} cases, at most {totals['most']:,}.")
+    what = "on each GPU" if plan.on_gpu else "on this machine"
+    typer.echo(f"Cases in total: {totals['cases']:,}, at most {totals['most']:,}.")
     time = source if seconds is None else f"{duration(seconds)}, {source}"
     typer.echo(f"Time: {time}. Not counted: compiling kernels that are new here, 5 to 15 s, once.")
-    typer.echo(f"Memory {what}: {_bytes(plan.memory)}. Disk: at most {_bytes(plan.disk)}.")
+    typer.echo(f"Memory needed {what}: {_bytes(plan.memory)}. Disk: at most {_bytes(plan.disk)}.")
     typer.echo("Nothing was run, nothing was written.")
     raise typer.Exit
 
