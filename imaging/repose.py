@@ -79,7 +79,7 @@ class ReposeAngle:
         return float(np.hypot(roughness, level_error(self._seen, self.outline)))
 
     def _level(self, seen: float) -> float:
-        return level_angle(seen, self.outline.elevation, self.outline.likely_distance)
+        return level_angle(seen, self.outline.elevation, self.outline.distance, self.outline.nearest)
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:

@@ -53,11 +53,16 @@ def seen_angle(angle: float, elevation: float, distance: float) -> float:
     return float(np.degrees(np.arctan((drop[outer] / across[outer]).min())))
 
 
-def level_angle(seen: float, elevation: float, distance: float | None = None) -> float:
+def level_angle(
+    seen: float, elevation: float, distance: float | None = None, nearest: float | None = None
+) -> float:
     """Return the angle of a cone [degrees] whose outline a camera sees as `seen`: undo `seen_angle`.
 
-    Without a distance, a level camera is far away, and any other camera at `USUAL_DISTANCE`.
+    Without a distance it is halfway between the angles from the nearest place and from far away. Without this
+    either, a level camera is far away, and any other camera at `USUAL_DISTANCE`.
     """
+    if distance is None and nearest is not None:
+        return 0.5 * (level_angle(seen, elevation, nearest) + level_angle(seen, elevation, math.inf))
     if distance is None and elevation == 0.0:
         return seen
     angle = seen
@@ -69,7 +74,7 @@ def level_angle(seen: float, elevation: float, distance: float | None = None) ->
 def level_error(seen: float, outline: Outline) -> float:
     """Return the standard error [degrees] of an angle from that of the elevation and an unknown distance."""
     elevation, away = outline.elevation, outline.likely_distance
-    if elevation == 0.0:
+    if elevation == outline.elevation_se == 0.0:
         return 0.0
     higher = level_angle(seen, elevation + outline.elevation_se, away) - level_angle(seen, elevation, away)
     if away is not None:
@@ -83,7 +88,7 @@ def near_change(seen: float, outline: Outline, share: float = 1.0) -> float:
     if outline.nearest is None:
         return 0.0
     near = level_angle(seen, outline.elevation, outline.nearest / share)
-    return near - level_angle(seen, outline.elevation, outline.likely_distance)
+    return near - level_angle(seen, outline.elevation, nearest=outline.nearest)
 
 
 def camera_error(seen: float, outline: Outline, lines: float) -> float:

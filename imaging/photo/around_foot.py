@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imaging.flank.outline import Doubt
 from imaging.flank.plate_line import PLATE_CLEARANCE, PlateLine
@@ -48,13 +49,14 @@ def without_strays(found: FoundHeap) -> FoundHeap:
     """Remove what is beyond a gap in the outline: grains that rolled off."""
     height = found.plate.rows_at(np.arange(len(found.rows))) - found.rows
     height = np.where(np.isfinite(height), height, 0.0)
-    tip = int(height.argmax())
-    low = np.flatnonzero(height <= PLATE_CLEARANCE)
-    first = int(low[low < tip].max(initial=-1)) + 1
-    last = int(low[low > tip].min(initial=len(height)))
-    kept = np.zeros(len(height), dtype=np.bool_)
-    kept[first:last] = True
+    kept = run_about(height > PLATE_CLEARANCE, int(height.argmax()))
     return replace(found, rows=np.where(kept, found.rows, np.nan))
+
+
+def run_about(kept: NDArray[np.bool_], at: int) -> NDArray[np.bool_]:
+    """Keep the columns from one on, in both directions, up to the first that is not kept."""
+    labels = np.cumsum(~kept)
+    return np.asarray(kept & (labels == labels[at]))
 
 
 def refuse_narrow_base(seen: Contrast, found: FoundHeap, ends: tuple[float, float], place: str) -> None:

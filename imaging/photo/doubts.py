@@ -24,7 +24,7 @@ LARGEST_TILT = 12.0
 """Tilt with a visible plate [degrees]."""
 LARGEST_ELEVATION = 12.0
 """Angle at which the camera looks down [degrees] whose effect is corrected (2.3 degrees on a heap of 20)."""
-LARGEST_NEAR_CHANGE = 2.0
+LARGEST_NEAR_CHANGE = 1.6
 """Change of the angle if the camera had the widest usual lens [degrees], where its distance is unknown."""
 LARGEST_MISFIT = 0.06
 """Root mean square of the outline's shape about its two lines, over its height: heaps of twenty grains across

@@ -20,7 +20,7 @@ from imaging.flank.outline import (
 )
 from imaging.flank.plate_line import PlateLine, find_plate
 from imaging.geometry import FloatArray, Layer
-from imaging.photo.around_foot import FoundHeap, least_difference
+from imaging.photo.around_foot import FoundHeap, least_difference, run_about
 from imaging.photo.background import Contrast
 from imaging.photo.doubts import LARGEST_UNSEEN_TILT
 from imaging.photo.foot import Base, below_plate, front_of_base, is_lowest_row, joined_foot
@@ -172,11 +172,8 @@ def _seen_whole(
     doubts = []
     bottom = bottom_edge(body, contrast, threshold)
     base = front_of_base(bottom, None)
-    elevation = elevation_se = 0.0
-    depth = 0.0
-    if base.seen:
-        plate, elevation, elevation_se = _raised(base, rows, plate, view, place)
-        depth = base.row + base.depth - plate.row
+    plate, elevation, elevation_se = _raised(base, rows, plate, view, place)
+    depth = base.row + base.depth - plate.row if base.seen else 0.0
     if abs(plate.tilt) > LARGEST_UNSEEN_TILT:
         finding = f"{plate.tilt:.1f} degrees without a visible plate, over {LARGEST_UNSEEN_TILT:g}"
         doubts.append(Doubt("tilt", finding))
@@ -204,15 +201,17 @@ def _on_seen_plate(
         return replace(level_view, doubts=(doubt,))
     line = plate.rows_at(np.arange(heap.shape[1]))
     combined = np.where(np.arange(heap.shape[0])[:, None] <= line, level, top)
-    base = front_of_base(bottom_edge(whole, combined, 1.0), plate.slope)
+    rows, bottom = (edge(whole, combined, 1.0) for edge in (top_edge, bottom_edge))
+    height = np.nan_to_num(line - rows)
+    # The bent edge of a plate is no foot, and strays beyond it are not the heap's.
+    least = min(max(LEAST_FOOT, FLOATING * height.max()), height.max())
+    own = run_about((bottom - line > LEAST_FOOT) | (height >= least), int(height.argmax()))
+    base = front_of_base(np.where(own, bottom, np.nan), plate.slope)
     if base.row + base.depth - plate.row < LEAST_FOOT:
         return level_view
     cropped = Doubt("border", "the heap's foot is cropped by the bottom border")
-    rows = top_edge(whole, combined, 1.0)
-    level_line = PlateLine(base.row, plate.slope, visible=True)
-    elevation = elevation_se = 0.0
-    if base.seen:
-        level_line, elevation, elevation_se = _raised(base, rows, plate, view, place)
+    rows, level_line = np.where(own, rows, np.nan), PlateLine(base.row, plate.slope, visible=True)
+    level_line, elevation, elevation_se = _raised(base, rows, level_line, view, place)
     depth = base.row + base.depth - level_line.row
     doubts = (cropped,) if whole[-1].any() else ()
     return FoundHeap(rows, level_line, elevation, elevation_se, doubts, depth)
@@ -247,6 +246,8 @@ def _raised(
 
     A given height of the camera replaces the measured one, with the front of the base where it is.
     """
+    if not base.seen:
+        return plate, 0.0, base.elevation_se
     if view.elevation is not None:
         depth = base.half_width * np.sin(np.radians(view.elevation))
         base = replace(base, row=base.row + base.depth - depth, depth=depth, depth_se=0.0)
