@@ -15,8 +15,6 @@ USUAL_DISTANCE = 10.0
 """Assumed distance [heap widths]: its effect is in the middle of those from `NEAR` to far away."""
 NEAR = 4.0
 """Smallest usual distance [heap widths]."""
-NEARNESS = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Middles of equal parts of an inverse distance, over its greatest value."""
 OTHER_GRAINS, MOST_GRAINS = 6.0, 2.0
 """Turn about a heap's axis [degrees] after which the outline has other grains: two, of twenty across; and the
 most that this adds to the variance, of that of the lines: intervals of 413 renders then hold 96 %."""
@@ -83,24 +81,24 @@ def level_error(seen: float, outline: Outline) -> float:
     return float(np.hypot(higher, 0.5 * reach))
 
 
-def near_change(seen: float, outline: Outline, share: float = 1.0) -> float:
-    """Return the change of an angle [degrees] at a share of the greatest possible inverse distance."""
+def near_change(seen: float, outline: Outline) -> float:
+    """Return the change of an angle [degrees] if the camera was at the nearest place that it may have had."""
     if outline.nearest is None:
         return 0.0
-    near = level_angle(seen, outline.elevation, outline.nearest / share)
+    near = level_angle(seen, outline.elevation, outline.nearest)
     return near - level_angle(seen, outline.elevation, nearest=outline.nearest)
 
 
 def camera_error(seen: float, outline: Outline, lines: float) -> float:
     """Return what the camera's place adds to the standard error of an angle's lines [degrees].
 
-    The inverse of an unknown distance is evenly likely up to that of the nearest place. And lines from nearby
-    or above touch a cone at other grains than those of the level outline, which are as rough.
+    An unknown distance changes the angle by that of the nearest place at most: two standard errors. And lines
+    from nearby or above touch a cone at other grains than those of the level outline, which are as rough.
     """
-    unknown = np.mean([near_change(seen, outline, share) ** 2 for share in NEARNESS])
+    unknown = 0.5 * near_change(seen, outline)
     above = np.tan(np.radians(outline.elevation)) / np.tan(np.radians(max(seen, 1.0)))
     turn = np.degrees(np.hypot(0.5 / (outline.likely_distance or math.inf), min(above, 1.0)))
-    return float(np.sqrt(unknown + lines**2 * min(turn / OTHER_GRAINS, MOST_GRAINS)))
+    return float(np.hypot(unknown, lines * min(turn / OTHER_GRAINS, MOST_GRAINS) ** 0.5))
 
 
 def level_outline(outline: Outline) -> Outline:

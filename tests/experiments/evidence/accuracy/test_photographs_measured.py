@@ -99,7 +99,7 @@ def test_a_dish_of_the_walls_hue_is_doubted() -> None:
 
 
 def test_a_plates_bent_edge_is_no_part_of_the_foot() -> None:
-    """With it the base is a third wider than the heap, the camera 5 degrees higher, the angle 2.4 too flat."""
+    """With it the base is wider than the heap, the camera 5 degrees higher, the angle 2.4 too flat."""
     row = varied(560284)
     assert row["outcome"] == "measured"
     # 95 % of such pictures are within 1.2 degrees.
@@ -109,7 +109,7 @@ def test_a_plates_bent_edge_is_no_part_of_the_foot() -> None:
 
 
 def test_a_foot_that_is_not_seen_leaves_the_cameras_height_unknown() -> None:
-    """White grains before a pale plate, 6 degrees below the camera: taken for level, 3.2 degrees too steep."""
+    """White grains on a pale plate, the camera 6 degrees up: taken for level, 3.2 degrees too steep."""
     assert "error" in varied(560206)["why"]
 
 
