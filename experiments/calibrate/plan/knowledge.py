@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doe.response.quadratic import FittedSurface
+from doe.samples.two_errors import TwoErrors
 from experiments.calibrate.plan.present import Key, Present
 from experiments.studyfile.candidate_section import Candidate
 
@@ -106,8 +107,8 @@ class Knowledge:
 
     def _known(self, key: Key) -> Array:
         local, known = self._locals[key], self.present.known[key]
-        variance = local.se**2 + known.measured.se**2 + known.model.at(local.mean) ** 2
-        return local.information(variance)
+        rest = local.se**2 + known.model.at(local.mean) ** 2
+        return local.information(_variance(rest, known.measured.se**2, known.measured.df))
 
     def is_judged(self, candidate: Candidate) -> bool:
         """Return True if a reading of a candidate has a surface."""
@@ -120,7 +121,7 @@ class Knowledge:
             key = candidate.scene, reading.response.observable
             if key not in self._locals:
                 continue
-            local, known = self._locals[key], self.present.known.get(key)
+            (local, known), df = (self._locals[key], self.present.known.get(key)), np.inf
             repeated = (
                 reading.sd.at(local.mean) ** 2 / (repeats * growth) + reading.common.at(local.mean) ** 2
             )
@@ -128,8 +129,8 @@ class Knowledge:
             if known is not None:
                 rest = local.se**2 + known.model.at(local.mean) ** 2
                 repeated = 1.0 / (1.0 / repeated + 1.0 / known.measured.se**2)
-                found -= self._known(key)
-            found += local.information(rest + repeated)
+                found, df = found - self._known(key), known.measured.df + repeats
+            found += local.information(_variance(rest, repeated, df))
         return found
 
     def relative(self, information: Array) -> Array:
@@ -152,3 +153,9 @@ class Knowledge:
         values, vectors = np.linalg.eigh(np.linalg.inv(information).mean(axis=0))
         vector = vectors[:, -1] * np.sign(vectors[np.abs(vectors[:, -1]).argmax(), -1])
         return vector, float(NORMAL * np.sqrt(values[-1]) / self.present.extent)
+
+
+def _variance(rest: Array, scatter: float | Array, df: float) -> Array:
+    """Add the variance of measurements; few of them widen both as they do the region of a campaign."""
+    total = rest + scatter
+    return total * (TwoErrors(np.inf, df).critical(scatter / total, 0.05) / NORMAL) ** 2

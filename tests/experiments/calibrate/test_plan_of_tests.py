@@ -10,7 +10,7 @@ import pytest
 from doe import Design, Factor, FactorSurface, Sample, Surface, central_composite, fit_surface
 from experiments.calibrate.plan.choice import Choice, TestPlan, make_plan
 from experiments.calibrate.plan.knowledge import Knowledge, Size, Variant
-from experiments.calibrate.plan.present import Key, Known, Present, fit_responses
+from experiments.calibrate.plan.present import EXACT, Key, Known, Present, fit_responses
 from experiments.studyfile.campaign import OptimumSettings, Response, SurfaceSettings
 from experiments.studyfile.candidate_section import Candidate, Error, Reading
 
@@ -103,6 +103,18 @@ def test_a_reading_alone_has_the_width_of_its_errors() -> None:
     wanted = 1.959964 / np.sqrt(1.0 / (0.01**2 + 0.01**2) + 12.0 / 0.2**2)
     assert half[:, 1] == pytest.approx(wanted)
     assert half[:, 0] == pytest.approx(1.959964 * 0.3 / np.sqrt(12.0))
+
+
+def test_a_response_measured_a_few_times_has_the_width_of_students_t() -> None:
+    surface = FactorSurface(DESIGN, "F")  # a reading of the factor, without an error of its own
+    present = Present.of(FACTORS, {})
+    for n, student in ((3, 4.302653), (5, 2.776445), (10**6, 1.959964)):
+        known = {("", "F"): Known(surface, Sample(0.27, 0.02, n), EXACT)}
+        knowledge = Knowledge(replace(present, known=known), {})
+        # Student's t of n - 1 in place of 1.96 deviations, and .2 / sqrt(12) of the box in parallel
+        wanted = 1.0 / np.hypot(1.0 / (student * 0.02 / n**0.5), 12.0**0.5 / (1.959964 * 0.2))
+        half = knowledge.relative(knowledge.base)[:, 1] * present.natural[:, 1]
+        assert half == pytest.approx(wanted, rel=1e-4)
 
 
 def test_more_repeats_and_larger_tests_tell_more_up_to_what_they_share(
