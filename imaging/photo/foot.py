@@ -164,7 +164,7 @@ class Base:
     @property
     def elevation(self) -> float:
         """Angle at which the camera looks down on the plate [degrees]."""
-        return float(np.degrees(np.arcsin(min(self.depth / self.half_width, 1.0))))
+        return float(np.degrees(np.arcsin(np.clip(self.depth / self.half_width, 0.0, 1.0))))
 
     @property
     def elevation_se(self) -> float:

@@ -8,6 +8,7 @@ from drawn_heaps import Camera, DrawnHeap, draw
 from imaging import Outline, PictureError, View, find_outline, measure, overlay
 from imaging.flank.camera_height import level_angle, level_error, seen_angle
 from imaging.flank.plate_line import PlateLine
+from imaging.photo.foot import Base
 
 WALL, PLATE, GRAIN = (235, 235, 230), (120, 110, 100), (45, 70, 95)
 BLUE = (170, 110, 60)
@@ -61,6 +62,13 @@ def test_the_plates_far_edge_is_not_taken_for_the_base(elevation: float, angle: 
     assert [doubt.name for doubt in measured.doubts] == ["elevation"] * (elevation > 12.0)
     given = measure(raised(angle, elevation), view=View(distance=np.inf, elevation=elevation))
     assert given.mean == pytest.approx(angle, abs=0.3)
+
+
+def test_a_base_that_bulges_upwards_is_level_within_its_error() -> None:
+    """Deeper than half its width, it has no ellipse's angle; its depth is known to 2 of 50 pixels."""
+    base = Base(100.0, 0.0, -60.0, 2.0, (0.0, 100.0))
+    assert base.elevation == 0.0
+    assert base.elevation_se == pytest.approx(np.degrees(2.0 / 50.0))
 
 
 def test_grain_and_plate_of_one_colour_are_doubted() -> None:
