@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from dem_warp.kernels.candidates import LONGEST_CYCLE, candidate_kernels
+from dem_warp.cycles import SHORTEST_CYCLE, Cycles
+from dem_warp.kernels.candidates import LONGEST_CYCLE, PACE_LANES, candidate_kernels
 from dem_warp.kernels.cells import cell_kernels
 from dem_warp.kernels.lanes import BLOCK, WARP
 from dem_warp.kernels.neighbours import list_threads, neighbour_kernels
@@ -35,22 +36,17 @@ from dem_warp.walls import Motion
 CHUNK = 256
 """Least number of steps of `advance`; a multiple of every cycle length."""
 
-SHORTEST_CYCLE = 2
-SKIN_PER_CYCLE, SKIN_PER_SERIAL_CYCLE = 0.1, 0.3
-"""Part of the skin that the fastest grain of a world may use up between two checks of the neighbour lists, on
-a GPU and on a CPU, where only moved grains cost in a rebuild."""
-
-SHORT_CYCLE, SKIN_PER_SHORT_CYCLE = 8, 0.25
-"""Cycle length up to which it may use up more on a GPU, as the check costs as much as so few steps."""
-
 LOOK_CHUNKS = 16
-"""Chunks after which the cycle length is chosen again from the speed of the grains."""
+"""Most chunks after which the cycle length is chosen again from the speed of the grains."""
 
 FULL_DEVICE_THREADS = 84_480
 """Threads of a step that a large GPU (132 multiprocessors) runs at once; with fewer threads more lanes per
 grain shorten a step."""
 
 MOST_LANES = 16
+
+SEARCH_THREADS = 4 * FULL_DEVICE_THREADS
+"""Threads of a search, which needs fewer registers than a step."""
 
 ANY_PACE = 1.0e9
 """Speed above that of any grain [m/s]: with it every entry of a list is a candidate."""
@@ -87,13 +83,15 @@ class Solver:
         self._wall_kernels = wall_kernels(self.build.without_forces)
         self._list_kernels = neighbour_kernels(self.build)
         room = [neighbour_room(world) for world in worlds]
-        self._candidate_kernels = candidate_kernels(self.build)
-        self.cycle_limit = LONGEST_CYCLE
+        self._candidate_kernels = candidate_kernels(self.build.without_forces)
+        self.cycles = Cycles(worlds, self.device.is_cuda)
         self.check_rate = CheckRate.USUAL
         with wp.ScopedDevice(self.device):
             self._build_state([(found, capacity or listed) for found, listed in room])
         self._running = list(range(len(worlds)))
-        self._pace = np.array([(w.time_step, w.skin, np.linalg.norm(w.gravity)) for w in worlds]).T
+        self._time_steps = np.array([world.time_step for world in worlds])
+        self._releases = [np.sort(world.grains.release_steps) for world in worlds]
+        self._free_grains = sum(world.grains.count for world in worlds)
         self._impulse_of_count = np.array([w.time_step / w.force_rate for w in worlds])
         self._graphs: dict[tuple[int, int, int, CheckRate], Any] = {}
         self._commands: tuple[Any, ...] = ()
@@ -124,7 +122,7 @@ class Solver:
         self._place_walls(FRAMES - 1)
         self.stale.fill_(ALL)
         self._rebuild(0)
-        self._check_cycle(0)
+        self._check_cycle(0, 0)
 
     def _whole_warps(self, threads: int) -> int:
         """Return the number of threads rounded up to whole warps of a GPU."""
@@ -135,10 +133,10 @@ class Solver:
 
     @property
     def lanes(self) -> int:
-        """Threads per grain: more if few grains run."""
+        """Threads per grain: more if few grains move freely."""
         if not self.device.is_cuda:
             return 1
-        grains = max(len(self._running) * self.layout.grain_count, 1)
+        grains = max(self._free_grains, 1)
         lanes = MOST_LANES
         while lanes > MIN_LANES and lanes * grains > FULL_DEVICE_THREADS:
             lanes //= 2
@@ -174,8 +172,10 @@ class Solver:
         binned = [self.model, grains, self.alive, self.stale, near, self.cells]
         self._launch(cells.bin_spheres, spheres, binned)
         self._launch(cells.open_buckets, self._whole_warps(spheres), [self.model, self.stale, self.cells])
-        self._launch(cells.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
-        self._launch(cells.search, spheres, [self.model, grains, self.stale, near, self.cells])
+        filled = [self.model, grains, self.stale, near, self.cells]
+        self._launch(cells.fill_buckets, self._whole_warps(spheres), filled)
+        threads = min(spheres * WARP, SEARCH_THREADS) if self.device.is_cuda else spheres
+        self._launch(cells.search, threads, [threads, *filled])
         threads = self.layout.grain_total * list_threads(self.build)
         written = [self.model, grains, self.stale, self.cells, self.neighbours, self.flags]
         self._launch(lists.write_lists, threads, written)
@@ -200,17 +200,17 @@ class Solver:
         wp.capture_if(self.any_stale, self._rebuild_together, steps=steps, read=read)
         threads = total * WARP if self.device.is_cuda else total
         inputs = [steps, self.model, self.alive, self.idle, self.fastest, self.neighbours]
-        self._launch(kernels.raise_pace, threads, inputs)
+        self._launch(kernels.raise_pace, total * (PACE_LANES if self.device.is_cuda else 1), inputs)
         if self.check_rate == CheckRate.EVERY_STEP:
             self.neighbours.near.pace.fill_(ANY_PACE)
         self._launch(kernels.select_near, threads, [steps, *seen, self.neighbours, self.fastest])
 
-    def _check_cycle(self, read: int) -> None:
-        """Find the fastest grains, and flag worlds that may have missed a contact."""
+    def _check_cycle(self, read: int, past: int) -> None:
+        """After some steps find the fastest grains, and flag worlds that may have missed a contact."""
         row = self._whole_warps(self.layout.grain_count)
         inputs = [
-            row, self.model, self.grains[read], self.alive, self.idle, self.neighbours, self.fastest,
-            self.flags,
+            row, past, self.model, self.alive, self.idle, self.grains[read], self.grains[1 - read],
+            self.neighbours, self.fastest, self.flags,
         ]  # fmt: skip
         self._launch(self._candidate_kernels.find_fastest, row * self.layout.world_count, inputs)
 
@@ -222,7 +222,7 @@ class Solver:
             self._prepare_cycle(each, first % 2)
             for step in range(first, first + each):
                 self._step(step % 2)
-            self._check_cycle((first + each) % 2)
+            self._check_cycle((first + each) % 2, each)
 
     def _graph(self, cycle: int) -> Any:
         key = (self.lanes, len(self._running), cycle, self.check_rate)
@@ -238,28 +238,21 @@ class Solver:
         return LONGEST_CYCLE // cycle if self.device.is_cuda else 1
 
     def _cycle_length(self, chunks: int) -> int:
-        """Return the steps of a cycle, a power of two, that the lists allow the fastest grain of any world.
-
-        Grains gain speed by their weight for some chunks; the lists allow for other accelerations.
-        """
+        """Return the steps of a cycle in the next chunks."""
         if self.check_rate != CheckRate.USUAL:
             return SHORTEST_CYCLE
-        time_step, skin, gravity = self._pace[:, self._running]
-        speed = self.fastest.numpy()[self._running] + gravity * chunks * CHUNK * time_step
-        with np.errstate(divide="ignore"):
-            free = float(np.min(skin / (speed * time_step)))
-        if self.device.is_cuda:
-            length = max(SKIN_PER_CYCLE * free, min(SKIN_PER_SHORT_CYCLE * free, SHORT_CYCLE))
-        else:
-            length = SKIN_PER_SERIAL_CYCLE * free
-        length = max(length, SHORTEST_CYCLE)
-        return int(2 ** np.floor(np.log2(min(length, self.cycle_limit))))
+        return self.cycles.length(self._running, self.fastest.numpy(), chunks * CHUNK)
+
+    def _count_free(self, chunks: int) -> int:
+        """Return how many grains of the running worlds move freely within the next chunks."""
+        last = self.grains[0].step.numpy() + chunks * CHUNK
+        return sum(int(np.searchsorted(self._releases[w], last[w])) for w in self._running)
 
     def advance(self, chunks: int = 1) -> None:
         """Take `chunks` times CHUNK steps in every running world."""
         while chunks > 0 and self._running:
-            ahead = min(chunks, LOOK_CHUNKS)
-            cycle = self._cycle_length(ahead)
+            ahead = min(chunks, max(self.cycles.valid(self._running, LOOK_CHUNKS * CHUNK) // CHUNK, 1))
+            cycle, self._free_grains = self._cycle_length(ahead), self._count_free(ahead)
             graph = self._graph(cycle)
             for _ in range(ahead * CHUNK // (cycle * self._cycles_captured(cycle))):
                 wp.capture_launch(graph)
@@ -317,7 +310,7 @@ class Solver:
         # the lists allow for the old motion only
         self.stale.assign(stale)
         self._rebuild(0)
-        self._check_cycle(0)
+        self._check_cycle(0, 0)
 
     def wall_pose(self, world: int, wall: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the place of the wall's own point [m] and its orientation (quaternion x y z w)."""
@@ -355,7 +348,7 @@ class Solver:
         velocities = grains.velocity.numpy().reshape(-1, n, 4)[chosen]
         numbers = [
             steps.tolist(),
-            (steps * self._pace[0, chosen]).tolist(),
+            (steps * self._time_steps[chosen]).tolist(),
             alive,
             released,
             positions,

@@ -282,6 +282,8 @@ def build_cells(
     spheres = layout.sphere_total
     _clear(cells, layout.world_count << sum(layout.cell_bits), device, bucket_size=int, bucket_start=int)
     _clear(cells, layout.world_count, device, cursor=int)
+    _clear(cells, spheres * wp.get_device(device).is_cuda, device, seeker=int)
+    _clear(cells, 1, device, seekers=int)
     _clear(cells, spheres, device, bucket=int, rank=int, order=int, found_count=int, ordered=precision.sphere)
     _clear(cells, spheres * found_capacity, device, found=int)
     cells.found_capacity = found_capacity

@@ -296,6 +296,8 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         bucket_size: wp.array(dtype=int)  # all zero between rebuilds, (worlds * buckets,)
         bucket_start: wp.array(dtype=int)  # (worlds * buckets,)
         cursor: wp.array(dtype=int)  # (worlds,)
+        seeker: wp.array(dtype=int)  # places of `order` whose spheres search, (spheres,) on a GPU, else (0,)
+        seekers: wp.array(dtype=int)  # number of them, (1,)
         bucket: wp.array(dtype=int)  # of a sphere, (spheres,)
         rank: wp.array(dtype=int)  # of a sphere in its bucket, (spheres,)
         order: wp.array(dtype=int)  # spheres by bucket, (spheres,)

@@ -12,6 +12,7 @@ import warp as wp
 from dem_warp.entries import max_partners
 from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.lanes import WARP, bit_count, lanes_with, largest_of_warp
+from dem_warp.kernels.motion import motion_functions
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.stale import ALL, SOME
 from dem_warp.kernels.walls import wall_functions
@@ -49,23 +50,25 @@ CLEARANCE = 2.0
 """Distance of a waiting grain from all free grains, over the skin, above which it has no list: until the next
 check each of two moves at most half a skin, and lists reach one skin."""
 
+PACE_LANES = 8
+"""Threads that raise a grain's pace on a GPU."""
+
 LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
 
 @functools.cache
 def candidate_kernels(build: Build) -> SimpleNamespace:
-    """Return the kernels to launch before some steps, in this order, and `find_fastest` for after them."""
+    """Return the kernels to launch before some steps, in this order, and `find_fastest`; they need no law."""
     precision = build.precision
     real = precision.real
     types = device_structs(precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     pack = packing(precision, build.is_periodic)
-    contacts = contact_functions(build)
-    walls = wall_functions(build.without_forces)
+    contacts, motion, walls = contact_functions(build), motion_functions(build), wall_functions(build)
     spheres_each = wp.constant(build.sphere_count)
     mask = wp.constant(max_partners(build.sphere_count) - 1)
     walls_each = wp.constant(build.wall_count)
-    lanes = wp.constant(WARP if build.cooperative else 1)
+    lanes, pace_lanes = (wp.constant(n if build.cooperative else 1) for n in (WARP, PACE_LANES))
     moved = wp.constant(MOVED if build.cooperative else MOVED_SERIAL)
     module = wp.get_module(f"dem_warp_candidates_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
@@ -170,19 +173,15 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
         if idle[w] != 0:
             return
         world = model.world[w]
-        if g % model.grain_count == 0:
-            neighbours.near.wall_path[w] = real(0.0)
-            neighbours.near.wall_speed[w] = 0.0
-            for i in range(walls_each):
-                further = rise(model, world, neighbours, w, i, ahead)
-                path = wall_path(model, world, grains, w, i, ahead) + further
-                neighbours.near.wall_path[w] = wp.max(neighbours.near.wall_path[w], path)
-                speed = wall_speed(model, world, grains, neighbours, w, i)
-                neighbours.near.wall_speed[w] = wp.max(neighbours.near.wall_speed[w], speed)
-                whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - neighbours.rebuilt[w])
-                if real(2.0) * (whole + further + risen(neighbours, w)) > world.skin:
-                    wp.atomic_max(stale, w, ALL)
-                    any_stale[0] = 1
+        for i in range(g % model.grain_count, walls_each, model.grain_count):
+            further = rise(model, world, neighbours, w, i, ahead)
+            path = wall_path(model, world, grains, w, i, ahead) + further
+            wp.atomic_max(neighbours.near.wall_path, w, path)
+            wp.atomic_max(neighbours.near.wall_speed, w, wall_speed(model, world, grains, neighbours, w, i))
+            whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - neighbours.rebuilt[w])
+            if real(2.0) * (whole + further + risen(neighbours, w)) > world.skin:
+                wp.atomic_max(stale, w, ALL)
+                any_stale[0] = 1
         neighbours.near.speed[g] = wp.max(speed_of(model, grains, g), float(KEPT) * neighbours.near.speed[g])
         own = float(HEADROOM) * neighbours.near.speed[g]
         neighbours.near.pace[g] = wp.max(own, float(SHAKEN) * fastest[w])
@@ -229,10 +228,12 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
         # state in and out
         neighbours: Neighbours,
     ):
-        """Raise the pace of a grain for neighbours that may hit it; a warp per grain on a GPU."""
+        """Raise the pace of a grain for neighbours that may hit it."""
         thread = wp.tid()
-        g = thread // lanes
-        lane = thread - g * lanes
+        g = thread // pace_lanes
+        lane = thread - g * pace_lanes
+        if g >= alive.shape[0]:
+            return
         w = g // model.grain_count
         if idle[w] != 0 or alive[g] <= 0 or neighbours.near.afar[g] != 0:
             return
@@ -244,7 +245,7 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
                 neighbours.near.pace[g] = wp.max(neighbours.near.pace[g], pace)
             return
         fastest_neighbour = float(0.0)
-        for k in range(lane, neighbours.count[g], lanes):
+        for k in range(lane, neighbours.count[g], pace_lanes):
             partner = neighbours.entry[g * neighbours.capacity + k] & mask
             speed = neighbours.near.wall_speed[w]
             if partner < model.grain_count * spheres_each:
@@ -255,9 +256,9 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
                     struck = float(STRUCK) * neighbours.near.speed[g]
                     neighbours.near.pace[j] = wp.max(neighbours.near.pace[j], struck)
             fastest_neighbour = wp.max(fastest_neighbour, speed)
-        fastest_neighbour = largest_of_warp(fastest_neighbour)
-        if lane == 0:
-            neighbours.near.pace[g] = wp.max(neighbours.near.pace[g], float(STRUCK) * fastest_neighbour)
+        # a pace is never below HEADROOM times the own speed
+        if float(STRUCK) * fastest_neighbour > float(HEADROOM) * neighbours.near.speed[g]:
+            wp.atomic_max(neighbours.near.pace, g, float(STRUCK) * fastest_neighbour)
 
     @wp.kernel(module=module, grid_stride=False)
     def select_near(
@@ -327,12 +328,15 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
     @wp.kernel(module=module, grid_stride=False)
     def find_fastest(
         row: int,
+        past: int,
         # model
         model: Model,
         # state in
-        grains: Grains,
         alive: wp.array(dtype=int),
         idle: wp.array(dtype=int),
+        # state in and out
+        grains: Grains,
+        copy: Grains,
         neighbours: Neighbours,
         # state out
         fastest: wp.array(dtype=float),
@@ -340,8 +344,8 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
     ):
         """Find each world's fastest grain or wall, and the highest point of its free grains.
 
-        It has `row` threads per world, whole warps on a GPU, and flags worlds in which a grain moved farther
-        than its lists allow.
+        It has `row` threads per world, on a GPU whole warps that move waiting grains on by `past` steps, and
+        flags worlds in which a grain moved farther than its lists allow.
         """
         thread = wp.tid()
         w = thread // row
@@ -352,6 +356,12 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
             world = model.world[w]
             g = w * model.grain_count + place
             if alive[g] > 0:
+                if wp.static(build.cooperative):
+                    if past > 0 and neighbours.near.afar[g] != 0:
+                        if past % 2 == 0:  # from the copy that was the present one before these steps
+                            motion.wait(model, world, grains, copy, g, past)
+                        else:
+                            motion.wait(model, world, copy, grains, g, past)
                 speed = speed_of(model, grains, g)
                 if not waits(model, grains, w, g):
                     top = float(grains.position[g][2]) + float(model.inertia[g][3])
@@ -359,12 +369,14 @@ def candidate_kernels(build: Build) -> SimpleNamespace:
                 outruns = neighbours.near.afar[g] == 0 and real(2.0) * travel > world.skin
                 if outruns or travel - neighbours.near.travel[g] > neighbours.near.path[g]:
                     wp.atomic_or(flags, w, LATE_REBUILD)
+            for i in range(place, walls_each, model.grain_count):
+                whole = wall_path(model, world, grains, w, i, grains.step[w] - neighbours.rebuilt[w])
+                if real(2.0) * (whole + risen(neighbours, w)) > world.skin:
+                    wp.atomic_or(flags, w, LATE_REBUILD)
+                speed = wp.max(speed, wall_speed(model, world, grains, neighbours, w, i))
             if place == 0:
-                for i in range(walls_each):
-                    whole = wall_path(model, world, grains, w, i, grains.step[w] - neighbours.rebuilt[w])
-                    if real(2.0) * (whole + risen(neighbours, w)) > world.skin:
-                        wp.atomic_or(flags, w, LATE_REBUILD)
-                    speed = wp.max(speed, wall_speed(model, world, grains, neighbours, w, i))
+                neighbours.near.wall_path[w] = real(0.0)
+                neighbours.near.wall_speed[w] = 0.0
                 if wp.static(build.has_free_wall):
                     if neighbours.lift[w][2] > neighbours.lift[w][3]:
                         wp.atomic_or(flags, w, LATE_REBUILD)

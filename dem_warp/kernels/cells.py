@@ -117,27 +117,35 @@ def cell_kernels(build: Build) -> SimpleNamespace:
         if size > 0:
             cells.bucket_start[cells.bucket[i]] = begin
 
-    @wp.kernel(module=module)
-    def fill_buckets(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
+    @wp.kernel(module=module, grid_stride=False)
+    def fill_buckets(model: Model, grains: Grains, stale: wp.array(dtype=int), near: Near, cells: Cells):
+        """Write the spheres by bucket, and on a GPU list those that search.
+
+        If only some grains have moved, these alone search.
+        """
         i = wp.tid()
-        w = i // (spheres_each * model.grain_count)
-        if stale[w] != 0 and cells.rank[i] >= 0:
-            first = w * spheres_each * model.grain_count
-            slot = first + cells.bucket_start[cells.bucket[i]] + cells.rank[i]
-            cells.order[slot] = i
-            pack.store_sphere(cells.ordered, slot, pack.load_sphere(grains.spheres, i))
+        w = wp.min(i // (spheres_each * model.grain_count), stale.shape[0] - 1)
+        slot = int(0)
+        seeks = bool(False)
+        if i < cells.rank.shape[0] and stale[w] != 0:
+            if cells.rank[i] >= 0:
+                first = w * spheres_each * model.grain_count
+                slot = first + cells.bucket_start[cells.bucket[i]] + cells.rank[i]
+                cells.order[slot] = i
+                pack.store_sphere(cells.ordered, slot, pack.load_sphere(grains.spheres, i))
+                seeks = stale[w] != SOME or near.moves[i // spheres_each] != 0
+        if wp.static(build.cooperative):
+            through = running_sum(wp.where(seeks, 1, 0))
+            begin = int(0)
+            if i % WARP == WARP - 1 and through > 0:
+                begin = wp.atomic_add(cells.seekers, 0, through)
+            begin = from_lane(begin, WARP - 1)
+            if seeks:
+                cells.seeker[begin + through - 1] = slot
 
     @wp.func
     def append(cells: Cells, i: int, partner: int):
         """Add a partner of sphere `i`; past the capacity only the count grows."""
-        n = cells.found_count[i]
-        if n < cells.found_capacity:
-            cells.found[i * cells.found_capacity + n] = partner
-        cells.found_count[i] = n + 1
-
-    @wp.func
-    def append_shared(cells: Cells, i: int, partner: int):
-        """Add a partner of sphere `i` while other threads may do so too."""
         n = wp.atomic_add(cells.found_count, i, 1)
         if n < cells.found_capacity:
             cells.found[i * cells.found_capacity + n] = partner
@@ -164,14 +172,66 @@ def cell_kernels(build: Build) -> SimpleNamespace:
             if wp.dot(d, d) < near * near:
                 append(cells, i, model.grain_count * spheres_each + facets.number + t)
 
-    @wp.kernel(module=module)
-    def search(model: Model, grains: Grains, stale: wp.array(dtype=int), near: Near, cells: Cells):
-        """Find the partners of each sphere.
+    @wp.func
+    def find_walls(
+        model: Model, world: World, grains: Grains, cells: Cells, w: int, i: int, a: precision.sphere,
+        lane: int, lanes: int,
+    ):  # fmt: skip
+        """Add the walls and triangles that are near to sphere `i`, a wall per lane."""
+        reach = pack.last(a) + world.skin + world.reach
+        place = pack.place(a, world)
+        for k in range(lane, walls_each, lanes):
+            if walls.touches(model, w, k, place, reach, grains.step[w]):
+                append(cells, i, model.grain_count * spheres_each + k)
+            if wp.static(build.has_mesh):
+                append_triangles(model, cells, i, w, k, place, reach, grains.step[w])
 
-        Threads follow the buckets, so that neighbouring threads read the same memory. A single thread finds
-        each pair once, in its own bucket and the half of the buckets after it; only the earlier grain lists
-        the other. Threads of a GPU each find their own partners, without waiting for another list. If only
-        some grains have moved, these alone search, also for the others.
+    def warp_search(
+        threads: int, model: Model, grains: Grains, stale: wp.array(dtype=int), near: Near, cells: Cells
+    ):
+        """Find the partners of each sphere that searches, with a lane per cell if few search.
+
+        If only some grains have moved, these search for the others, too.
+        """
+        thread = wp.tid()
+        count = cells.seekers[0]
+        sharing = int(WARP)
+        while sharing > 1 and count * sharing > threads:
+            sharing = sharing // 2
+        lane = thread % sharing
+        for n in range(thread // sharing, count, threads // sharing):
+            slot = cells.seeker[n]
+            w = slot // (spheres_each * model.grain_count)
+            first = w * spheres_each * model.grain_count
+            i = cells.order[slot]
+            world = model.world[w]
+            a = pack.load_sphere(cells.ordered, slot)
+            reach = pack.last(a) + world.skin + world.reach
+            c = cell_of(a, world)
+            for m in range(lane, CELLS_AROUND, sharing):
+                x, y = around(c[0] + m % 3 - 1, world), around(c[1] + (m // 3) % 3 - 1, world)
+                b = bucket_of(x, y, c[2] + m // 9 - 1, cells.bits, w)
+                begin = first + cells.bucket_start[b]
+                for k in range(begin, begin + cells.bucket_size[b]):
+                    q = pack.load_sphere(cells.ordered, k)
+                    d = pack.difference(a, q, world)
+                    touching = reach + pack.last(q)
+                    if wp.dot(d, d) < touching * touching:
+                        j = cells.order[k]
+                        h = j // spheres_each
+                        if h != i // spheres_each:
+                            append(cells, i, j - first)
+                            if stale[w] == SOME and near.moves[h] == 0:
+                                append(cells, j, i - first)
+            find_walls(model, world, grains, cells, w, i, a, lane, sharing)
+
+    def serial_search(
+        threads: int, model: Model, grains: Grains, stale: wp.array(dtype=int), near: Near, cells: Cells
+    ):
+        """Find the partners of each sphere in a single thread.
+
+        Each pair is found once, in its own bucket and the half of the buckets after it; only the earlier
+        grain lists the other. If only some grains have moved, these alone search, also for the others.
         """
         slot = wp.tid()
         w = slot // (spheres_each * model.grain_count)
@@ -183,20 +243,16 @@ def cell_kernels(build: Build) -> SimpleNamespace:
         alone = stale[w] == SOME
         if alone and near.moves[g] == 0:
             return
-        halved = bool(False)
-        if wp.static(not build.cooperative):
-            halved = not alone
         world = model.world[w]
         a = pack.load_sphere(cells.ordered, slot)
         reach = pack.last(a) + world.skin + world.reach
         c = cell_of(a, world)
-        own = int(0)
-        for n in range(wp.where(halved, OWN_CELL, 0), CELLS_AROUND):
+        for n in range(wp.where(alone, 0, OWN_CELL), CELLS_AROUND):
             x, y = around(c[0] + n % 3 - 1, world), around(c[1] + (n // 3) % 3 - 1, world)
             b = bucket_of(x, y, c[2] + n // 9 - 1, cells.bits, w)
             begin = first + cells.bucket_start[b]
             end = begin + cells.bucket_size[b]
-            if halved and n == OWN_CELL:
+            if not alone and n == OWN_CELL:
                 begin = slot + 1
             for k in range(begin, end):
                 q = pack.load_sphere(cells.ordered, k)
@@ -205,24 +261,12 @@ def cell_kernels(build: Build) -> SimpleNamespace:
                 if wp.dot(d, d) < touching * touching:
                     j = cells.order[k]
                     h = j // spheres_each
-                    if h != g:
-                        if wp.static(build.cooperative):
-                            if own < cells.found_capacity:
-                                cells.found[i * cells.found_capacity + own] = j - first
-                            own += 1
-                            if alone and near.moves[h] == 0:
-                                append_shared(cells, j, i - first)
-                        else:
-                            if halved or h > g or near.moves[h] == 0:
-                                append(cells, wp.min(i, j), wp.max(i, j) - first)
-        if wp.static(build.cooperative):
-            cells.found_count[i] = own
-        for k in range(walls_each):
-            if walls.touches(model, w, k, pack.place(a, world), reach, grains.step[w]):
-                append(cells, i, model.grain_count * spheres_each + k)
-        if wp.static(build.has_mesh):
-            for k in range(walls_each):
-                append_triangles(model, cells, i, w, k, pack.place(a, world), reach, grains.step[w])
+                    if h != g and (not alone or h > g or near.moves[h] == 0):
+                        append(cells, wp.min(i, j), wp.max(i, j) - first)
+        find_walls(model, world, grains, cells, w, i, a, 0, 1)
+
+    own_search = warp_search if build.cooperative else serial_search
+    search = wp.kernel(own_search, module=module, grid_stride=False)
 
     return SimpleNamespace(
         bin_spheres=bin_spheres,

@@ -22,7 +22,7 @@ BLOCK = 8
 
 @functools.cache
 def motion_functions(build: Build) -> SimpleNamespace:
-    """Return `move`, `move_world`, `spread_spheres`, `clear_spheres` and `rounded` of one build."""
+    """Return the functions that move grains and place their spheres, of one build."""
     precision = build.precision
     real, vec3, vec4, quat, sphere = (
         precision.real, precision.vec3, precision.vec4, precision.quat, precision.sphere,
@@ -152,6 +152,22 @@ def motion_functions(build: Build) -> SimpleNamespace:
         )  # fmt: skip
 
     @wp.func
+    def wait(model: Model, world: World, grains: Grains, out: Grains, g: int, steps: int):
+        """Move a grain that waits on by some steps in both copies, a step at a time for the same bits."""
+        v4 = pack.load_vec4(grains.velocity, g)
+        position = grains.position[g]
+        for _step in range(steps):
+            position = moved(world, position, vec3(v4[0], v4[1], v4[2]))
+        center = pack.pack(position, pack.last(pack.load_sphere(grains.center, g)), world)
+        turned = integration.rounded(grains.orientation[g])
+        grains.position[g] = position
+        out.position[g] = position
+        pack.store_sphere(grains.center, g, center)
+        pack.store_sphere(out.center, g, center)
+        spread_spheres(model, world, grains, g, center, turned, 0, 1)
+        spread_spheres(model, world, out, g, center, turned, 0, 1)
+
+    @wp.func
     def taken(neighbours: Neighbours, g: int):
         """Return force with rolling torque, and torque, of a grain, and reset them."""
         force = pack.load_vec4(neighbours.reactions.force, g)
@@ -272,6 +288,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
 
     return SimpleNamespace(
         move=move,
+        wait=wait,
         move_world=move_world,
         spread_spheres=spread_spheres,
         clear_spheres=clear_spheres,

@@ -192,13 +192,10 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         return less + rank_of(cells.found, i * cells.found_capacity, own, entry & mask)
 
     @wp.func
-    def count_kept(
-        model: Model, world: World, grains: Grains, neighbours: Neighbours, w: int, g: int, end: int
-    ) -> int:
+    def kept_before(neighbours: Neighbours, slot: int, end: int, kept: int) -> int:
         """Return the number of entries that stay before a slot of a grain's old list."""
-        kept = int(0)
-        for k in range(g * neighbours.capacity, end):
-            kept += wp.where(stays(model, world, grains, neighbours, w, g, neighbours.entry[k]), 1, 0)
+        if slot < end:
+            return neighbours.near.item[slot][0]
         return kept
 
     @wp.kernel(module=module, grid_stride=False)
@@ -233,11 +230,15 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
                     is_kept = stays(model, world, grains, neighbours, w, g, entry)
                 kept_lanes = lanes_with(is_kept)
                 place = kept + bit_count(kept_lanes & ((1 << lane) - 1))
+                if k < old_count:
+                    # the near entries are listed anew afterwards
+                    neighbours.near.item[first + k] = wp.vec2i(place, 0)
                 if is_kept:
                     place += count_found(world, cells, g, entry)
                     if place < world.list_limit:
                         draft(neighbours, cells, first + place, entry, first + k)
                 kept += bit_count(kept_lanes)
+        sync_warp()
         for k in range(lane, found, WARP):
             i = g * spheres_each
             rest = int(k)
@@ -248,7 +249,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
             place = count_found(world, cells, g, entry)
             old = place_of(neighbours.entry, first, old_count, entry, place)
             if not moves:
-                place += count_kept(model, world, grains, neighbours, w, g, first + old)
+                place += kept_before(neighbours, first + old, first + old_count, kept)
             slot = int(-1)
             if old < old_count:
                 if neighbours.entry[first + old] == entry:
@@ -276,6 +277,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
             rebuilds[w] = rebuilds[w] + 1
         if w == 0:
             any_stale[0] = 0
+            cells.seekers[0] = 0
 
     written = write_lists if build.cooperative else merge_lists
     return SimpleNamespace(write_lists=written, finish=finish, module=module)

@@ -71,7 +71,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
                 prefetch_place(grains_in.position, g)
                 prefetch_four(model.inertia, g)
             count = neighbours.near.count[g]
-            moving = alive[g] > 0
+            moving = alive[g] > 0 and neighbours.near.afar[g] == 0
             step = grains_in.step[w]
             if wp.static(build.cooperative):
                 if not moving or step < model.release_step[g]:

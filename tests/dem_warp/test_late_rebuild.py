@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 from worlds import PYRAMID, SMALL_TUBE, assert_same_result, run_batch, small_case
 
-from dem_warp import Case, batch, simulate, solver
+from dem_warp import Case, batch, cycles, simulate, solver
 from dem_warp.rollback import Rollback
 from dem_warp.scenes.walled_scene import default_skin
 from dem_warp.types import CheckRate
@@ -55,7 +55,7 @@ def test_steps_are_taken_again_with_a_closer_look_first(heap, monkeypatch):
 def test_a_world_that_is_taken_back_changes_no_other(heap, restored, monkeypatch):
     # Cycles as long as the fastest grain takes for four skins: falling grains outrun their lists, less often
     # with the wider skin, whose world goes on while the other takes its steps again.
-    monkeypatch.setattr(solver, "SKIN_PER_SERIAL_CYCLE", 4.0)
+    monkeypatch.setattr(cycles, "SKIN_PER_SERIAL_CYCLE", 4.0)
     cases = [few(), few(seed=2, skin=2.5e-3)]
     results = run_batch(cases)
     assert restored.count(0) > restored.count(1)

@@ -67,7 +67,7 @@ def test_a_pile_with_all_mechanisms_comes_to_rest_and_its_contacts_outlast_rebui
     midst = state(solver)
     assert np.abs(midst["velocities"]).max() > 0.02
     often = solve(rich_pile(seed=2), rich_pile(skin=3e-4), precision="mixed")
-    often.cycle_limit = 2
+    often.cycles.limit = 2
     run_for(often, FALL)
     assert often.rebuilds.numpy()[1] > 100
     worlds.assert_same_bits(state(often, 1), midst)
