@@ -1,7 +1,7 @@
 """The score of the analysis: findings against the revealed truths, and both against what was aimed at."""
 
 import math
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,15 +11,11 @@ from scipy import stats
 from scipy.stats import binomtest
 
 from doe.discrepancy import Verdict
-from experiments.discover.mechanism_files import FORMER_NAMES
 from experiments.evidence.trials.findings import CRASH
 from experiments.evidence.trials.truth import Kind, Label, Sealed
-from experiments.evidence.trials.truths import STRONG, Declared
+from experiments.evidence.trials.truths import STRONG
 
 _JUDGED = ("kind", "truth", "true_size", "multiple", "right", "tied", "wrong")
-
-OTHERS = ("weak single", *map(str, Kind), "two names", *map(str, Verdict), CRASH)
-"""Labels of a confusion that name no mechanism."""
 
 DRAWS = 2000
 """Draws of a bootstrap over trials."""
@@ -106,45 +102,6 @@ def strong_singles(table: pd.DataFrame) -> pd.DataFrame:
 def share(column: pd.Series) -> Share:
     """Count the true of a boolean column."""
     return Share(int(column.sum()), len(column))
-
-
-def confusion(table: pd.DataFrame) -> pd.DataFrame:
-    """Count answers (columns) by truth (rows).
-
-    A mechanism's row has its trials above 1.5 detectable sizes; the weaker ones of all are one row. Two names
-    are one column, as are the verdicts without a name.
-    """
-    strong = (table["kind"] == Kind.SINGLE) & (table["multiple"] > STRONG)
-    weak = (table["kind"] == Kind.SINGLE) & ~strong
-    truth = table["truth"].where(strong, table["kind"].mask(weak, "weak single"))
-    names, naming = table["named"].str.split(), table["verdict"] == Verdict.NAMED
-    answer = table["verdict"].mask(naming, table["named"]).mask(naming & (names.str.len() > 1), "two names")
-    counts = pd.crosstab(truth, answer, rownames=["truth"], colnames=["answer"])
-    return counts.reindex(index=_names_first(counts.index), columns=_names_first(counts.columns))
-
-
-def _names_first(labels: Iterable[str]) -> list[str]:
-    """Sort labels: mechanisms by name, then kinds of trials or verdicts."""
-    return sorted(labels, key=lambda label: (OTHERS.index(label) if label in OTHERS else -1, label))
-
-
-def power_curve(table: pd.DataFrame) -> pd.DataFrame:
-    """Shares of alarms and of right names by effect, over all trials of one resolvable mechanism.
-
-    A row is a class of size: its ends ``least`` and ``most`` (in detectable ones), ``trials``, and for
-    ``alarm`` and ``right`` the share with the ends of its interval.
-    """
-    singles = table[(table["kind"] == Kind.SINGLE) & (table["multiple"] > 0)]
-    rows = []
-    classes = pd.cut(singles["multiple"], POWER_EDGES, labels=False)
-    for number, members in singles.groupby(classes):
-        least, most = POWER_EDGES[int(number) : int(number) + 2]  # type: ignore[call-overload]
-        row = {"least": least, "most": most, "trials": len(members)}
-        for name in ("alarm", "right"):
-            counted = share(members[name])
-            row |= zip((name, f"{name}_low", f"{name}_high"), (counted.value, *counted.interval), strict=True)
-        rows.append(row)
-    return pd.DataFrame(rows)
 
 
 def by_mechanism(table: pd.DataFrame) -> pd.DataFrame:
@@ -251,24 +208,6 @@ def unknown_area(table: pd.DataFrame) -> str:
     foreign = table[table["kind"].isin([Kind.WITHHELD, Kind.OUTSIDE])]
     scores = (rows["misfit"].astype(float).fillna(-np.inf).to_numpy() for rows in (foreign, strong))
     return area_text(*scores)
-
-
-MUST_RESOLVE = (
-    "contact_adhesion", "liquid_bridges", "size_spread", "plate_tilt", "vibration", "rolling_torque",
-)  # fmt: skip
-"""Mechanisms that must be resolvable at half of their range; that of rolling is missing from the base."""
-
-
-def declared_aim(library: Sequence[Declared]) -> Aim:
-    """Hold what was declared beforehand against the mechanisms that must be resolvable."""
-    # Sealed records keep the names that they were sealed with.
-    sealed = {FORMER_NAMES.get(effect.name, effect.name): effect.name for effect in library}
-    wanted = [sealed.get(name, name) for name in MUST_RESOLVE]
-    seen = {effect.name for effect in library if effect.resolvable and effect.strongest >= 2.0}
-    missing = [name for name in wanted if name not in seen]
-    found = f"not {', '.join(missing)}" if missing else "every one"
-    question = f"resolvable at half of their range: {', '.join(wanted)}"
-    return Aim(question, "every one", found, not missing)
 
 
 def _mechanism_aims(above: str, counts: pd.DataFrame) -> tuple[Aim, Aim]:

@@ -1,6 +1,6 @@
-"""The record of the trials: tables, pictures and one page, written from its own files."""
+"""The record of the trials: tables and one page, written from its own files."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,21 +8,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from doe.plots.palette import BLUE, MUTED, VERMILION
-from experiments.evidence.page_figures import new_axes, save_figure
 from experiments.evidence.record_page import markdown_table, write_page
 from experiments.evidence.trials.declaration import Declaration, read_declaration
 from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS, read_findings
 from experiments.evidence.trials.score import (
-    OTHERS,
     Aim,
     aims,
     by_mechanism,
     by_outsider,
-    confusion,
-    declared_aim,
     foreign_aims,
-    power_curve,
     scored,
     unknown_area,
 )
@@ -117,7 +111,7 @@ def read_record(folder: Path) -> Record:
 
 
 def write_trials_page(folder: Path) -> Path:
-    """Write the page and the pictures of a record from its files, its notes after the introduction."""
+    """Write the page of a record from its files, its notes after the introduction."""
     record, notes = read_record(folder), folder / NOTES
     heaps = _FOREIGN.format(code=record.code) if record.reality else _OURS
     parts = [f"{heaps} {_SEALED}", *([notes.read_text(encoding="utf-8")] if notes.is_file() else [])]
@@ -127,7 +121,7 @@ def write_trials_page(folder: Path) -> Path:
     for view, title in TITLES.items():
         if done := len(record.in_view(view)):
             some = f" of {record.sealed}" if done < record.sealed else ""
-            parts += _view(record, view, f"## {title}\n\n{done}{some} trials.", folder)
+            parts += _view(record, view, f"## {title}\n\n{done}{some} trials.")
     return write_page(folder / PAGE, *parts)
 
 
@@ -168,21 +162,15 @@ def _declared(declared: Declaration) -> str:
         f"resolvable if it is distinct from every other and its range holds more than {STRONG:g} gamma80; no "
         "other may be named."
     )
-    aim = _aims([declared_aim(declared.library)])
-    return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}\n{aim}"
+    return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}"
 
 
-def _view(record: Record, view: str, heading: str, folder: Path) -> list[str]:
+def _view(record: Record, view: str, heading: str) -> list[str]:
     rows, found = record.in_view(view), record.aims(view)
-    _draw_power(power_curve(rows), folder / f"power-{view}.png")
-    _draw_confusion(confusion(rows), folder / f"confusion-{view}.png")
     verdict = "verdict" if len(rows) == record.sealed else "verdict so far"
     parts = [
         f"{heading} {_UNAIMED.get(view, '')}",
         _figures(found) if view in _UNAIMED else _aims(found, verdict),
-        f"![shares of alarms and names by effect](power-{view}.png)",
-        f"![answers by truth](confusion-{view}.png)",
-        "Strong effects have a row each. In brackets: trials.",
         "### Strong effects, by mechanism",
         markdown_table(by_mechanism(rows).reset_index()),
     ]
@@ -206,56 +194,3 @@ def _aims(found: Sequence[Aim], verdict: str = "verdict") -> str:
 
 def _figures(found: Sequence[Aim]) -> str:
     return markdown_table(pd.DataFrame([{"question": aim.question, "found": aim.found} for aim in found]))
-
-
-def _draw_power(curve: pd.DataFrame, path: Path) -> None:
-    figure, axes = new_axes(7.2, 3.8, "y")
-    places = np.arange(len(curve))
-    series = (("alarm", "gap found", BLUE, -0.08), ("right", "named right", VERMILION, 0.08))
-    for name, label, colour, aside in series if len(curve) else ():
-        value = curve[name].to_numpy()
-        spread = np.abs(curve[[f"{name}_low", f"{name}_high"]].to_numpy().T - value)
-        axes.errorbar(places + aside, value, spread, fmt="o", color=colour, capsize=3, label=label)
-    if len(curve):
-        axes.set_xticks(places, [_class_label(row) for row in curve.itertuples()])
-        strong = int((curve["most"] <= STRONG).sum())
-        axes.axvline(strong - 0.5, color=MUTED, linestyle=":", linewidth=1.0)
-        figure.legend(frameon=False, loc="outside upper right", ncols=len(series))
-    axes.set(xlabel="effect [gamma80], and trials", ylabel="share of trials", ylim=(-0.03, 1.03))
-    save_figure(figure, path)
-
-
-def _class_label(row: Any) -> str:
-    ends = f"{row.least:g} to {row.most:g}" if np.isfinite(row.most) else f"above {row.least:g}"
-    return f"{ends}\n({row.trials})"
-
-
-def _draw_confusion(counts: pd.DataFrame, path: Path) -> None:
-    trials = counts.sum(axis=1)
-    shares = counts.div(trials, axis=0).to_numpy()
-    width, height = 2.8 + 0.42 * counts.shape[1], 2.0 + 0.27 * counts.shape[0]
-    figure, axes = new_axes(width, height, grid=None)
-    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
-    for (row, column), count in np.ndenumerate(counts.to_numpy()):
-        if count:
-            ink = "white" if shares[row, column] > 0.6 else "black"
-            axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color=ink)
-    columns, rows = (
-        [str(name).replace("_", " ") for name in names] for names in (counts.columns, counts.index)
-    )
-    labels = [f"{name} ({count})" for name, count in zip(rows, trials, strict=True)]
-    axes.set_xticks(range(len(columns)), columns, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
-    axes.set_yticks(range(len(labels)), labels, fontsize=8)
-    axes.set_xticks(np.arange(1, len(columns)) - 0.5, minor=True)
-    axes.set_yticks(np.arange(1, len(labels)) - 0.5, minor=True)
-    axes.grid(which="minor", color="white", linewidth=1.0)
-    axes.tick_params(which="both", length=0)
-    axes.axhline(_mechanisms(counts.index) - 0.5, color=MUTED, linewidth=1.0)
-    axes.axvline(_mechanisms(counts.columns) - 0.5, color=MUTED, linewidth=1.0)
-    axes.set(xlabel="verdict", ylabel="truth")
-    save_figure(figure, path)
-
-
-def _mechanisms(names: Iterable[str]) -> int:
-    """Count the labels of a confusion that name a mechanism; they come first."""
-    return sum(name not in OTHERS for name in names)

@@ -9,6 +9,7 @@ import pandas as pd
 import typer
 
 from experiments.evidence.accuracy.statistics.agreements import agreements
+from experiments.evidence.accuracy.statistics.alarms import alarms
 from experiments.evidence.accuracy.statistics.coverage import AT_LEAST, AT_MOST, SLACK, Figure, figures_table
 from experiments.evidence.accuracy.statistics.direct_coverage import direct_readings
 from experiments.evidence.accuracy.statistics.fidelity import fidelity
@@ -27,6 +28,7 @@ THEMES: dict[str, Callable[[], Iterator[Figure]]] = {
     "agreements": agreements,
     "plans": plans,
     "fidelity": fidelity,
+    "alarms": alarms,
 }
 """Parts of the record, each a file of its own."""
 
@@ -40,6 +42,7 @@ TITLES = {
     "agreements": "Agreement",
     "plans": "Plans of tests",
     "fidelity": "Surfaces moved from a cheaper scale",
+    "alarms": "Alarms and names of the search",
 }
 
 ROUNDING = 1e-9
@@ -65,8 +68,8 @@ def page(folder: Path = FOLDER) -> str:
         ".932 to .968 (`doe.samples.two_errors`). n: measurements behind a target. Spread: standard "
         "deviation of a measurement over that of a run. Read: factors measured by themselves, by n "
         "readings each or with a stated error; model: sd of the model's parameter over the standard error of "
-        "the readings (drawn on 2026-11-27). Plans: on 2026-11-28, on two cores; on the "
-        "engine, twins of heaps of 150 grains.",
+        "the readings (drawn on 2026-11-27). Plans, alarms: on 2026-11-28, on two cores; on the "
+        "engine, twins of heaps of 150 grains. At most 1: a level that nobody states, for comparison.",
     ]
     for theme, title in TITLES.items():
         table = pd.read_csv(folder / f"{theme}.csv")

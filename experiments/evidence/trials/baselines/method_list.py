@@ -4,10 +4,10 @@ from collections.abc import Mapping
 
 from experiments.evidence.trials.baselines.methods.bayes_factors import BayesFactors
 from experiments.evidence.trials.baselines.methods.bic import Bic
+from experiments.evidence.trials.baselines.methods.boosting import Boosting
 from experiments.evidence.trials.baselines.methods.discrepancy import Discrepancy
 from experiments.evidence.trials.baselines.methods.inference import Sbi, is_installed
-from experiments.evidence.trials.baselines.methods.lasso import Lasso
-from experiments.evidence.trials.baselines.methods.mmd import Mmd
+from experiments.evidence.trials.baselines.methods.lisdd import Lisdd
 from experiments.evidence.trials.baselines.methods.search_method import Search, Simulator
 from experiments.evidence.trials.baselines.protocol import Method
 
@@ -17,7 +17,15 @@ SEARCH, ALONE = "search", "search, bank alone"
 
 def methods(simulator: Simulator | None) -> dict[str, Method]:
     """List every method by name; the search with fresh runs where a simulator answers them."""
-    found: list[Method] = [Search(ALONE, None), BayesFactors(), Bic(), Lasso(), Discrepancy(), Mmd(), Sbi()]
+    found: list[Method] = [
+        Search(ALONE, None),
+        BayesFactors(),
+        Bic(),
+        Lisdd(),
+        Boosting(),
+        Discrepancy(),
+        Sbi(),
+    ]
     if simulator is not None:
         found.insert(0, Search(SEARCH, simulator))
     return {method.name: method for method in found}

@@ -1,4 +1,4 @@
-"""Write the record of the methods: tables, charts and one page, from their answers and the truths.
+"""Write the record of the methods: tables and one page, from their answers and the truths.
 
     python -m experiments.evidence.trials.baselines.record_methods out/baselines --out RECORD
     python -m experiments.evidence.trials.baselines.record_methods out/measured out/trials --out RECORD
@@ -21,7 +21,6 @@ from experiments.evidence.record_page import markdown_table, write_page
 from experiments.evidence.trials.baselines import benchmark_files
 from experiments.evidence.trials.baselines.answers_table import FOLDER, add_answer, file_of, read_answers
 from experiments.evidence.trials.baselines.measured_problems import open_labels, opened_trials
-from experiments.evidence.trials.baselines.method_charts import draw_power, draw_roc
 from experiments.evidence.trials.baselines.method_list import ALONE, SEARCH, methods
 from experiments.evidence.trials.baselines.method_tables import (
     areas,
@@ -44,9 +43,6 @@ from experiments.io.files import copy_file
 
 SERIES = Path(__file__).parents[1] / "record"
 """Records of the trials: labels and declaration of a series are read there where it is kept whole."""
-
-ROC, POWER = "roc.png", "power.png"
-"""Pictures of a record."""
 
 INTRODUCTION = """# Methods of model criticism on the same bank and the same heaps
 
@@ -140,13 +136,11 @@ def read_record(record: Path, allowed: Sequence[str] | None = None) -> pd.DataFr
 
 
 def write_methods_page(record: Path) -> Path:
-    """Write the page and the pictures of a record from its files, its notes after the introduction."""
+    """Write the page of a record from its files, its notes after the introduction."""
     table = read_record(record)
     notes = record / NOTES
     names = list(dict.fromkeys(table["method"]))
     reference = SEARCH if SEARCH in names else ALONE
-    draw_roc(table, record / ROC)
-    draw_power(table, record / POWER)
     kinds = table.drop_duplicates("trial")["kind"].value_counts()
     counted = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
     alarm, named = (power(table, column).reset_index() for column in ("alarm", "named_right"))
@@ -159,11 +153,9 @@ def write_methods_page(record: Path) -> Path:
         markdown_table(_declared(names)),
         AREAS,
         markdown_table(areas(table)),
-        f"![curves of the alarm and of unknown]({ROC})",
         POWERS,
         markdown_table(alarm.round(2)),
         markdown_table(named.round(2)),
-        f"![shares of alarms and of names by size]({POWER})",
         f"## The {reference} against each other method\n\n{PAIRED.format(reference)}",
         markdown_table(comparisons(table, reference)),
         *_held(record, reference),

@@ -28,8 +28,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import softmax
 
+from doe.discrepancy.fitting.fitted_model import Stack
 from experiments.evidence.trials.baselines.methods.contest import judged, prior_of_one
-from experiments.evidence.trials.baselines.methods.mmd import predicted_means
 from experiments.evidence.trials.baselines.protocol import LEVEL, ODDS, Answer, Mechanisms, Problem
 from experiments.io.errors import InputError
 
@@ -106,6 +106,19 @@ def drawn_means(problem: Problem, rng: np.random.Generator) -> Drawn:
         for model, count in zip(models, counts, strict=True)
     ]
     return Drawn(models, np.concatenate(parts), np.repeat(np.arange(len(models)), [len(p) for p in parts]))
+
+
+def predicted_means(stack: Stack, rng: np.random.Generator, points: int, repeats: int = 1) -> np.ndarray:
+    """Means as the model has them at points in its ranges, with errors drawn so often at each.
+
+    Returns
+    -------
+    (points * repeats, means) array
+    """
+    size = len(stack.target)
+    x = rng.uniform(stack.model.lower, stack.model.upper, (points, len(stack.model.lower)))
+    noise = [rng.standard_normal((repeats, size)) @ np.linalg.cholesky(stack.covariance(row)).T for row in x]
+    return np.asarray(stack.predict(x)[:, None] + np.array(noise)).reshape(-1, size)
 
 
 @contextmanager

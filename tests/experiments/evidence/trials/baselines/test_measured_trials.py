@@ -44,7 +44,7 @@ def test_measured_trials_are_posed_as_the_search_has_them(tmp_path: Path) -> Non
     assert "vibration" not in problem.emulator.space.names
     assert problem.settings == settings
     # A plate that tilts by 5 degrees is hidden in these heaps, which the engine made.
-    answer = methods(None)["lasso"](problem)
+    answer = methods(None)["BIC"](problem)
     assert answer.alarm
     assert set(answer.named) <= {"plate_tilt"}
 

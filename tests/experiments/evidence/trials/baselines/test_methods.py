@@ -13,18 +13,22 @@ from synthetic_world import CONDITIONS, OBSERVABLES, SETTINGS, emulator, measure
 from doe.discrepancy.fitting.model_fit import weigh
 from doe.errors import RuleError
 from experiments.evidence.trials.baselines.method_list import ALONE, installed, methods
-from experiments.evidence.trials.baselines.methods import discrepancy, inference
+from experiments.evidence.trials.baselines.methods import discrepancy, inference, lisdd
 from experiments.evidence.trials.baselines.methods.contest import judged, prior_of_one
-from experiments.evidence.trials.baselines.methods.lasso import selected
-from experiments.evidence.trials.baselines.methods.mmd import misspecified
 from experiments.evidence.trials.baselines.methods.model_evidence import log_evidence, smc
 from experiments.evidence.trials.baselines.protocol import Answer, Problem
 from experiments.io.errors import InputError
 
 KNOWN = emulator().without("delta", "epsilon", "zeta", "twin")
-NAMING = ("Bayes factors", "BIC", "lasso")
+REFUSING = ("Bayes factors", "BIC", "boosted trees")
+NAMING = (*REFUSING, "LISDD")
 SBI = pytest.param("sbi", marks=pytest.mark.library("sbi"))
 EVERY = [SBI if name == "sbi" else name for name in methods(None)]
+
+
+@pytest.fixture(autouse=True)
+def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inference, "POINTS", 1000)  # seven models need no more
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +60,7 @@ def test_a_strong_effect_is_named(name: str, strong: Problem) -> None:
     assert (answer.named, answer.tied) == (("beta",), False)
 
 
-@pytest.mark.parametrize("name", NAMING)
+@pytest.mark.parametrize("name", REFUSING)
 def test_what_the_library_lacks_is_not_named_alone(name: str, foreign: Problem) -> None:
     answer = methods(None)[name](foreign)
     assert answer.alarm
@@ -150,28 +154,24 @@ def test_the_evidence_on_the_emulator_is_its_integral(nothing: Problem) -> None:
     assert found == pytest.approx(exact, abs=3.0 * (error + 0.15))
 
 
-def test_the_lasso_finds_a_sparse_truth() -> None:
-    rng = np.random.default_rng(4)
-    columns = rng.standard_normal((60, 6))
-    residuals = 1.5 * columns[:, 1] + 1.0 * columns[:, 4] + rng.standard_normal(60)
-    found = selected(columns, residuals)
-    taken = found.chosen & (found.p_values < 0.025)
-    np.testing.assert_array_equal(np.flatnonzero(taken), [1, 4])
+def test_an_f_test_confirms_a_mechanism_that_acts_and_refuses_one_that_does_not(strong: Problem) -> None:
+    assert lisdd.confirmed(strong, ("beta", "gamma")) == ("beta",)
+    # of forecasts of each condition by the others those with the true mechanism are the best of the singles
+    errors = {names: lisdd.forecast_error(strong.fitted(names)) for names in strong.singles}
+    assert min(errors, key=errors.__getitem__) == ("beta",)
 
 
-def test_debiased_p_values_keep_their_level() -> None:
-    rng = np.random.default_rng(5)
-    columns = rng.standard_normal((40, 5))
-    alarms = sum(selected(columns, rng.standard_normal(40)).p_values.min() < 0.1 for _ in range(150))
-    # Holm's correction keeps 10 %, and with five nearly independent columns wastes little of it.
-    assert stats.binom.ppf(1e-3, 150, 0.07) <= alarms <= stats.binom.isf(1e-3, 150, 0.1)
-
-
-def test_p_values_of_the_kernel_distance_are_uniform_under_the_prior() -> None:
-    rng = np.random.default_rng(6)
-    p_values = [misspecified(row, rng.standard_normal((100, 6)))[0] for row in rng.standard_normal((200, 6))]
-    assert stats.kstest(p_values, "uniform").pvalue > 1e-3
-    assert misspecified(np.full(6, 9.0), rng.standard_normal((100, 6)))[0] == pytest.approx(1.0 / 101.0)
+def test_a_condition_that_is_off_is_located(nothing: Problem) -> None:
+    stack, blocks = nothing.stack(()), list(nothing.blocks)
+    assert lisdd.located(stack, blocks).min() > 1e-3
+    # ten standard deviations of a mean
+    moved = (
+        blocks[2].mean + 10.0 * np.sqrt(np.diag(stack.covariance(nothing.fitted().x)))[: len(blocks[2].mean)]
+    )
+    blocks[2] = replace(blocks[2], mean=moved)
+    found = lisdd.located(stack, blocks)
+    assert found.argmin() == 2
+    assert found[2] < 1e-9
 
 
 @pytest.mark.library("sbi")
