@@ -22,10 +22,10 @@ LARGEST_UNSEEN_TILT = 5.0
 """Tilt without a visible plate [degrees]: hands hold a phone level within 3 or 4."""
 LARGEST_TILT = 12.0
 """Tilt with a visible plate [degrees]."""
-LARGEST_ELEVATION = 12.0
-"""Angle at which the camera looks down [degrees] whose effect is corrected (2.3 degrees on a heap of 20)."""
-LARGEST_NEAR_CHANGE = 1.6
-"""Change of the angle if the camera had the widest usual lens [degrees], where its distance is unknown."""
+LARGEST_ELEVATION = 13.0
+"""Angle at which the camera looks down [degrees] whose effect is corrected (3.9 degrees on a heap of 20)."""
+LARGEST_NEAR_CHANGE = 2.0
+"""Change of the angle if the camera had the widest usual lens, plus the standard error [degrees]."""
 LARGEST_MISFIT = 0.06
 """Root mean square of the outline's shape about its two lines, over its height: heaps of twenty grains across
 have up to 0.055, a parabola 0.069, half a circle 0.075."""
@@ -81,9 +81,9 @@ def doubts_of(
     if outline.elevation > LARGEST_ELEVATION:
         finding = f"the camera looks down by {outline.elevation:.0f} degrees, over {LARGEST_ELEVATION:g}"
         yield Doubt("elevation", finding)
-    nearer = near_change(0.5 * (left.angle + right.angle), outline)
-    if abs(nearer) > LARGEST_NEAR_CHANGE:
-        finding = f"{nearer:+.1f} degrees if the camera was {outline.nearest:.1f} heap widths away"
+    near = near_change(0.5 * (left.angle + right.angle), outline)
+    if near and abs(near) + se > LARGEST_NEAR_CHANGE:
+        finding = f"{near:+.1f} +- {se:.1f} degrees if the camera was {outline.nearest:.1f} heap widths away"
         yield Doubt("distance", f"{finding}, over {LARGEST_NEAR_CHANGE:g}: give its distance")
     misfit = relative_misfit(left, right, outline)
     if misfit > LARGEST_MISFIT:
