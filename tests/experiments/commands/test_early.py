@@ -23,7 +23,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "no TOML": ("[wall]", "[wall"),
     "an unknown key": ("size_sd = 0.05", "size_sdd = 0.05"),
     "a wrong unit": ('density = "700 kg/m^3"', 'density = "700 mm"'),
-    "a range reversed": ("low = 0.3\nhigh = 0.6", "low = 0.6\nhigh = 0.3"),
+    "a range reversed": ('grain.static_friction"\nlow = 0.3', 'grain.static_friction"\nlow = 0.7'),
     "a clump file that is not there": ('sphere = "2 mm"', 'clump = "none.txt"'),
     "a clump that is none": ('sphere = "2 mm"', 'clump = "words.txt"'),
     "a factor that leads nowhere": (
@@ -33,7 +33,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "laws that are none": ('laws = "relative"', 'laws = "liggghtz"'),
     "an engine that is none": ("[numerics]", '[engine]\nname = "nobody"\n\n[numerics]'),
     "a file of measurements without its columns": (
-        'mean = "30 deg"\nsd = "0.5 deg"\nn = 5',
+        'mean = "20 deg"\nsd = "0.5 deg"\nn = 5',
         'file = "words.txt"',
     ),
     "a decision on no factor": ("at_most = 3", 'at_most = 3\nkeep = ["Z"]'),
