@@ -10,7 +10,7 @@ import pytest
 import pyvista
 from commandline import dem_warp, refused
 
-from experiments import cli, runs, studyfile
+from experiments import cli, studyfile
 from experiments.commands.console import CaseProgress, describe_progress, duration
 from imaging import save_picture
 
@@ -43,7 +43,7 @@ def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(runs.calibration, "run_campaign", interrupt)
+    monkeypatch.setattr("experiments.runs.calibration.run_campaign", interrupt)
     path = write_study()
     options = ("--out", "my results", "--scale", "stiff", "--device", "cpu", "--workers", 2)
     code, _, err = dem_warp("calibrate", path, *options, "--json")
