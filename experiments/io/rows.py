@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from experiments.io import excel_files
 from experiments.io.errors import InputError
 from experiments.io.texts import nearest_name, read_text
 
@@ -40,7 +41,7 @@ def read_rows(
     known: Collection[str],
     renamed: Callable[[list[str]], list[str]] | None = None,
 ) -> Iterator[Row]:
-    """Read the rows of a CSV file in UTF-8; empty rows, and rows that begin with ``#``, are skipped.
+    """Read the rows of a CSV file in UTF-8, or of Excel; empty rows and those that begin ``#`` are skipped.
 
     The first row names the columns: all that are needed, and any of the known ones. With `renamed`, which
     returns known names and empty ones for columns to ignore, it is the first row with all needed columns.
@@ -70,19 +71,27 @@ def _lines(path: Path, numbered: bool) -> Iterator[tuple[int, list[str]]]:
 
     With `numbered` a first cell as ``#40``, the number of a sieve, begins no comment.
     """
-    text = read_text(path)
-    delimiter = _delimiter(text)
+    delimiter, rows = _read(path)
     try:
-        reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-        for row in reader:
+        for line, row in rows:
             cells = [cell.strip() for cell in row]
             if delimiter != ",":
                 cells = [_with_point(cell) for cell in cells]
             number = numbered and re.fullmatch(r"# ?\d+", cells[0] if cells else "") and any(cells[1:])
             if any(cells) and (number or not cells[0].startswith("#")):
-                yield reader.line_num, cells
+                yield line, cells
     except csv.Error as error:
         raise InputError(str(path), f"is not a CSV file: {error}") from None
+
+
+def _read(path: Path) -> tuple[str, Iterator[tuple[int, list[str]]]]:
+    """Return what separates a file's cells, nothing in Excel, and its lines of cells."""
+    if path.suffix.lower() == excel_files.ENDING:
+        return "", excel_files.read_cells(path)
+    text = read_text(path)
+    delimiter = _delimiter(text)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+    return delimiter, ((reader.line_num, row) for row in reader)
 
 
 def _delimiter(text: str) -> str:

@@ -21,16 +21,18 @@ from experiments.cases.execute import build_cases
 from experiments.cases.store.outcome_table import Outcome
 from experiments.export import EXPORTERS, ExportedTest, case_terms, export_input, write_export
 from experiments.io.errors import InputError
+from experiments.io.excel_files import ENDING, write_cells
 from experiments.io.files import write_text
 from experiments.io.rows import Row, read_rows
 from experiments.io.texts import is_number, number, safe_cell
 from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file
 from experiments.measurement.photographs import PictureOptions, angle_of, measure_pictures
+from experiments.measurement.value_limits import limits_of_test
 from experiments.runs.request import AwaitingRuns
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
 from experiments.studyfile.mechanism_factor import MechanismFactor
-from experiments.studyfile.observables import ANGLE, View
+from experiments.studyfile.observables import ANGLE, View, observables_of
 from imaging import PictureError
 
 SHEETS, CASE, PICTURE, FAILED = "by-hand", "case", "picture", "failed"
@@ -56,6 +58,8 @@ class Result:
     unit: str
     pictured: bool
     """A picture or the spheres of the heap can stand in its place."""
+    limits: tuple[float, float]
+    """Smallest and largest value that is possible in the test."""
 
     @property
     def head(self) -> str:
@@ -89,7 +93,7 @@ def typed_cases(study: Study, table: pd.DataFrame, folder: Path, title: str, sto
     cases, refused = build_cases(study, table)
     keys = [store.key(case)[:KEY] if case else "" for case in cases]
     asked = [_asked(study, key, row) for key, row in zip(keys, table.to_dict("records"), strict=True) if key]
-    every = tuple(_result_of(each) for each in study.target.responses)
+    every = tuple(_result_of(study, each) for each in study.target.responses)
     first = next((case for case in cases if case), None)
     filled = _Sheets(study, folder, title, every).take(asked, first)
     known = {each.key: _result(filled[each.key], each.results, study.measurement.fit) for each in asked}
@@ -112,8 +116,9 @@ def typed_points(
 
     Mechanisms of the library that a point lacks are at their null. Raise as `typed_cases` does.
     """
+    size, free = limits_of_test(study), (-math.inf, math.inf)  # a condition may change the lengths
     results = tuple(
-        Result(each.name, each.unit, each.by_photograph)
+        Result(each.name, each.unit, each.by_photograph, free if each.unit == "m" else size.limits(each))
         for each in study.measurable
         if each.name in observables
     )
@@ -152,12 +157,17 @@ class _Sheets:
         if not asked:  # the study refused all of them
             return {}
         columns = [CASE, *PLACES, *asked[0].settings, *_heads(self.results)]
-        sheets = sorted((self.folder / SHEETS).glob("*.csv"))
-        filled = {row[CASE]: row for path in sheets for row in read_rows(path, [CASE], columns)}
+        sheets = sorted(p for p in (self.folder / SHEETS).glob("*.*") if p.suffix in (".csv", ENDING))
+        filled: dict[str, Row] = {}
+        for row in (row for path in sheets for row in read_rows(path, [CASE], columns)):
+            if row[CASE] in filled:
+                raise row.error(f"must be one row, but is in {filled[row[CASE]].place(CASE)} too", CASE)
+            filled[row[CASE]] = row
         fresh = [run for run in asked if run.key not in filled]
         if fresh and case:
             name = re.sub("[^a-z]+", "-", self.title.lower())
-            path = self.folder / SHEETS / f"{len(sheets) + 1:02d}-{name}.csv"
+            ending = self.study.engine.sheet if self.study.engine else "csv"
+            path = self.folder / SHEETS / f"{len(sheets) + 1:02d}-{name}.{ending}"
             codes = (f"{EXPORTERS[code].code}: {line}" for code in CODES for line in _names(self.study, code))
             _write_sheet(path, fresh, [*codes, *self.words])
             _write_protocols(path.parent, self.study, case)
@@ -172,15 +182,18 @@ def _asked(study: Study, key: str, row: Mapping[str, Any]) -> AskedRun:
     """Ask for a case of a campaign: the responses of its test."""
     places = (row["stage"], row["scene"], row["run"], row["replicate"], row["seed"])
     settings = {_head(factor): float(row[factor.name]) for factor in study.factors}
-    results = tuple(_result_of(each) for each in study.target.responses if each.scene == row["scene"])
+    results = tuple(_result_of(study, each) for each in study.target.responses if each.scene == row["scene"])
     return AskedRun(key, dict(zip(PLACES, places, strict=True)), settings, results)
 
 
-def _result_of(response: Response) -> Result:
+def _result_of(study: Study, response: Response) -> Result:
     if response.weights or response.part_of:
         problem = "is a profile, which nobody can type in"
         raise InputError(f"response {response.name}", problem, hint="Give it as numbers of the heap.")
-    return Result(response.observable, response.unit, response.observable == ANGLE)
+    name, scene = response.observable, study.scenes[response.scene]
+    limits = limits_of_test(study, response.scene)
+    known = observables_of(scene.observables, scene.leaves_a_heap)[name]
+    return Result(name, response.unit, name == ANGLE, limits.limits(known))
 
 
 def _heads(results: Sequence[Result]) -> Iterator[str]:
@@ -201,10 +214,14 @@ def _write_sheet(path: Path, runs: Sequence[AskedRun], words: Sequence[str]) -> 
         for run in runs
     ]
     first = f"Fill in the last columns; write {FAILED} for a run that failed. Change nothing else."
-    comments = "".join(f"# {word.replace(',', ';')}\n" for word in (first, *words))
+    comments = [f"# {word.replace(',', ';')}" for word in (first, *words)]
     path.parent.mkdir(parents=True, exist_ok=True)
     frame = pd.DataFrame(rows).map(safe_cell)
-    write_text(path, comments + frame.to_csv(index=False, float_format=DIGITS, lineterminator="\n"))
+    if path.suffix == ENDING:
+        write_cells(path, comments, [list(frame), *frame.to_numpy().tolist()])
+        return
+    table = frame.to_csv(index=False, float_format=DIGITS, lineterminator="\n")
+    write_text(path, "\n".join([*comments, table]))
 
 
 def _names(study: Study, code: str) -> Iterator[str]:
@@ -236,7 +253,7 @@ def _require_unchanged(run: AskedRun, row: Row) -> None:
     for head, wanted in run.settings.items():
         text = row[head]
         if not is_number(text) or not math.isclose(number(text), wanted, rel_tol=1e-6, abs_tol=1e-12):
-            raise row.error(f"must stay as the campaign wrote it, {wanted!r}", head)
+            raise row.error(f"must stay as the campaign wrote it, {DIGITS % wanted}", head)
 
 
 def _require_filled(asked: Sequence[AskedRun], filled: Mapping[str, Row]) -> None:
@@ -247,13 +264,15 @@ def _require_filled(asked: Sequence[AskedRun], filled: Mapping[str, Row]) -> Non
     path = empty[0].file
     if len(empty) == sum(filled[run.key].file == path for run in asked):
         raise AwaitingRuns(_waiting(path, len(empty)))
-    lines = ", ".join(f"{row['run']} repeat {row['repeat']} (line {row.line})" for row in empty[:LISTED])
+    lines = ", ".join(
+        f"{row['stage']} run {row['run']} repeat {row['repeat']} (line {row.line})" for row in empty[:LISTED]
+    )
     more = f" and {len(empty) - LISTED} more" if len(empty) > LISTED else ""
-    raise InputError(str(path), f"has no result yet for run {lines}{more}")
+    raise InputError(str(path), f"has no result yet for {lines}{more}")
 
 
 def _failed(row: Row, results: Sequence[Result]) -> bool:
-    return FAILED in [row[head] for head in _heads(results)]
+    return FAILED in [row[head].lower() for head in _heads(results)]
 
 
 def _is_filled(row: Row, results: Sequence[Result]) -> bool:
@@ -261,10 +280,13 @@ def _is_filled(row: Row, results: Sequence[Result]) -> bool:
     return _failed(row, results) or all(row[each.head] for each in results if not (shown and each.pictured))
 
 
-def _value(row: Row, head: str) -> float:
-    if not is_number(row[head]):
-        raise row.error("must be a number", head)
-    return number(row[head])
+def _value(row: Row, result: Result) -> float:
+    text, (low, high) = row[result.head], result.limits
+    if not is_number(text) or not math.isfinite(number(text)):
+        raise row.error("must be a number", result.head)
+    if not low <= number(text) <= high:
+        raise row.error(f"must be between {low:.3g} and {high:.3g} in this test", result.head)
+    return number(text)
 
 
 def _result(row: Row, results: Sequence[Result], fit: str) -> dict[str, Any]:
@@ -276,7 +298,7 @@ def _result(row: Row, results: Sequence[Result], fit: str) -> dict[str, Any]:
         if each.pictured and not row[each.head]:
             result |= _pictured(row, fit)
         else:
-            result[each.observable] = _value(row, each.head)
+            result[each.observable] = _value(row, each)
     return result
 
 
@@ -286,7 +308,7 @@ def _outcome(row: Row, results: Sequence[Result], study: Study) -> Outcome:
         return np.full(len(results), math.nan), SAID
     shown = _shown(row, study) if row[PICTURE] else {}
     typed = {
-        each.observable: _value(row, each.head)
+        each.observable: _value(row, each)
         for each in results
         if row[each.head] or each.observable not in shown
     }

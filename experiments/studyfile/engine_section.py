@@ -19,6 +19,8 @@ class EngineSection(Section):
     """Command of any other program, which is started in the folder of a case; no shell reads it."""
     by: Literal["hand"] | None = None
     """``"hand"``: a person simulates the cases in any program, and types in what comes out."""
+    sheet: Literal["csv", "xlsx"] = "csv"
+    """File of the runs by hand; ``"xlsx"``, a sheet of Excel, needs openpyxl (dem-warp[excel])."""
     approximate: bool = False
     """Take the nearest for what an engine that ships lacks, as dem-warp export --approximate does."""
     version: str = ""

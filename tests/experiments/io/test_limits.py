@@ -28,6 +28,7 @@ WriteStudy = Callable[..., Path]
 READERS: dict[str, Callable[[Path], object]] = {
     "a.toml": load_study,
     "a.csv": lambda path: list(rows.read_rows(path, [], ["a"])),
+    "a.xlsx": lambda path: list(rows.read_rows(path, [], ["a"])),
     "a.txt": ClumpShape.read,
     "a.stl": read_mesh,
     "a.png": read_picture,
@@ -52,7 +53,7 @@ def test_a_pipe_and_a_device_are_no_files(tmp_path: Path, name: str) -> None:
         READERS[name](tmp_path / name)
 
 
-@pytest.mark.parametrize("name", ["a.toml", "a.csv", "a.txt", "a.stl", "a.png"])
+@pytest.mark.parametrize("name", ["a.toml", "a.csv", "a.xlsx", "a.txt", "a.stl", "a.png"])
 def test_a_file_of_a_terabyte_is_not_read(tmp_path: Path, name: str) -> None:
     with (tmp_path / name).open("wb") as file:
         file.truncate(10**12)
@@ -138,6 +139,17 @@ def test_a_small_bank_that_claims_much_is_refused(tmp_path: Path) -> None:
             member.write(bytes(10_000_000))
     with pytest.raises(DesignError, match="at most 500,000,000"):
         load_bank(path)
+
+
+def test_a_small_sheet_of_excel_that_claims_much_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "runs.xlsx"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr("xl/sharedStrings.xml", bytes(101_000_000))
+    with pytest.raises(errors.InputError, match="at most 100,000,000 bytes, unpacked"):
+        list(rows.read_rows(path, [], ["a"]))
+    path.write_bytes(b"a,b\n1,2\n")
+    with pytest.raises(errors.InputError, match="is not a sheet of Excel"):
+        list(rows.read_rows(path, [], ["a"]))
 
 
 def test_a_small_picture_that_claims_much_is_refused(tmp_path: Path) -> None:

@@ -2,9 +2,11 @@
 
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pandas as pd
 import pytest
 from commandline import dem_warp
@@ -119,9 +121,15 @@ def test_a_sheet_that_is_not_as_it_was_written_is_refused(study: Path) -> None:
     filled = sheet.read_text(encoding="utf-8")
     lines = filled.splitlines()
     for wrong, message in [
-        ("\n".join([*lines[:-1], empty.splitlines()[-1]]), "has no result yet for run 12 repeat 1"),
+        ("\n".join([*lines[:-1], empty.splitlines()[-1]]), "has no result yet for screening run 12 repeat 1"),
         (filled.replace(",0.29,", ",0.3,", 1), "A [1]: must stay as the campaign wrote it, 0.29, got 0.3"),
         ("\n".join([*lines[:-1], lines[-1].rsplit(",", 2)[0] + ",steep,"]), "must be a number, got steep"),
+        ("\n".join([*lines[:-1], lines[-1].rsplit(",", 2)[0] + ",inf,"]), "must be a number, got inf"),
+        (
+            "\n".join([*lines[:-1], lines[-1].rsplit(",", 2)[0] + ",200,"]),
+            "between 0 and 90 in this test",
+        ),
+        ("\n".join([*lines, lines[-1]]), "case: must be one row, but is in"),
         ("\n".join([*lines[:-1], lines[-1].rsplit(",", 2)[0] + ",,heap.png"]), "picture: shows no angle"),
     ]:
         sheet.write_text(wrong + "\n", encoding="utf-8")
@@ -129,6 +137,30 @@ def test_a_sheet_that_is_not_as_it_was_written_is_refused(study: Path) -> None:
         assert code == 2
         assert message in said
         assert not Path("run/report.html").exists()
+
+
+def test_a_sheet_of_excel_is_written_filled_and_read(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with study.open("a", encoding="utf-8") as file:
+        file.write('\n[engine]\nby = "hand"\nsheet = "xlsx"\n')
+    words = ("calibrate", study, "--scale", "paper", "--out", "run")
+    assert dem_warp(*words)[0] == 0
+    sheet = Path("run/by-hand/01-noise-floor-screening.xlsx")
+    book = openpyxl.load_workbook(sheet)
+    rows = [row for row in book.active if not str(row[0].value).startswith("#")]
+    [place] = [cell.column - 1 for cell in rows[0] if cell.value == "angle [deg]"]
+    for number, row in enumerate(rows[1:]):
+        row[place].value = 20.0 + number
+    rows[-1][place].value = "Failed"
+    book.save(sheet)
+    code, _, said = dem_warp(*words, "--resume")
+    assert code == 0, said
+    floor = np.std([20.0 + n for n, row in enumerate(rows[1:]) if row[1].value == "noise_floor"], ddof=1)
+    assert f"A single case varies in angle by {floor:.2f} deg" in said
+    assert "1 of 12 cases failed (1 failed)" in said
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    code, _, said = dem_warp(*words, "--resume")
+    assert code == 2
+    assert "Install it by pip install 'dem-warp[excel]'" in said
 
 
 @pytest.mark.parametrize("fit", ["flank", "middle"])
