@@ -7,7 +7,7 @@ Kratos Multiphysics (its DEM benchmarks 1 to 8), which agree where both have the
 polyethylene (test 5), nylon (test 6) and copper (test 7), and which two pairs test 8 compares.
 """
 
-from dem_warp import Material
+from dem_warp import ContactLaws, Material
 from experiments.evidence.verification.problems.impact import Impact, Partner
 from experiments.evidence.verification.problems.setups import material
 
@@ -37,7 +37,8 @@ RESTITUTION_MATERIALS = {"aluminium oxide": ALUMINIUM_OXIDE, "cast iron": CAST_I
 
 def damped(substance: Material, restitution: float, clamp: bool = False) -> Impact:
     """Test 3: a sphere of 2.5 mm radius on a rigid plane at 3.9 m/s."""
-    return Impact(substance, 0.0025, 3.9, restitution=restitution, clamp=clamp)
+    laws = ContactLaws(attraction="clamped" if clamp else "free")
+    return Impact(substance, 0.0025, 3.9, restitution=restitution, laws=laws)
 
 
 OBLIQUE_MATERIALS = {"aluminium oxide": ALUMINIUM_OXIDE, "aluminium alloy": ALUMINIUM_ALLOY}

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from dem_warp import ClumpShape, Material, Mechanism, rayleigh_time
+from dem_warp import EDEM, ClumpShape, ContactLaws, Material, Mechanism, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Plane
 from experiments.evidence.verification.problems.setups import RIGID, bodies, contact, record, world
@@ -41,16 +41,20 @@ class Impact(Partner):
     tangential_speed: float = 0.0
     restitution: float = 1.0
     friction: float = 0.0
-    clamp: bool = False
+    laws: ContactLaws = EDEM
     partner: Partner | None = None
     plate: Material = RIGID
     mechanisms: tuple[Mechanism, ...] = ()
+    spring: float = 1.0
+    """Tangential stiffness over that of Mindlin's theory without slip."""
 
     @cached_property
     def law(self) -> ContactCoefficients:
         """Coefficients of the contact."""
         hit = self.partner.material if self.partner else self.plate
-        return contact(self.material, hit, self.restitution, self.friction, 0.0, self.clamp, self.mechanisms)
+        kinds = self.laws, self.mechanisms
+        law = contact(self.material, hit, self.restitution, self.friction, 0.0, *kinds)
+        return replace(law, shear_modulus=self.spring * law.shear_modulus)
 
     @property
     def partner_mass(self) -> float:
@@ -102,7 +106,8 @@ class Impact(Partner):
             densities.append(self.partner.material.density)
         grains = bodies(positions, densities, velocities=velocities, spins=spins, sizes=sizes)
         walls = () if self.partner else (Plane(),)
-        return world(grains, ClumpShape.sphere(self.radius), self.law, time_step, walls=walls)
+        setup = world(grains, ClumpShape.sphere(self.radius), self.law, time_step, walls=walls)
+        return replace(setup, forms=self.laws.forms)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dem_warp import ClumpShape, ContactLaws, Interaction, Material, Mechanism
+from dem_warp import EDEM, ClumpShape, ContactLaws, Interaction, Material, Mechanism
 from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
 from dem_warp.solver import Solver
 from dem_warp.walls import Plane, Wall
@@ -38,10 +38,9 @@ STEEL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.30)
 
 def contact(
     a: Material, b: Material, restitution: float = 1.0, friction: float = 0.0, rolling: float = 0.0,
-    clamp: bool = False, mechanisms: tuple[Mechanism, ...] = (),
+    laws: ContactLaws = EDEM, mechanisms: tuple[Mechanism, ...] = (),
 ) -> ContactCoefficients:  # fmt: skip
     """Contact of two materials."""
-    laws = ContactLaws(attraction="clamped" if clamp else "free")
     return ContactCoefficients.of_pair(a, b, Interaction(restitution, friction, rolling), laws, mechanisms)
 
 
