@@ -4,7 +4,6 @@ from experiments.evidence.verification.check import Problem
 from experiments.evidence.verification.problems.beverloo import beverloo
 from experiments.evidence.verification.problems.deme_contacts import deme_contacts
 from experiments.evidence.verification.problems.energy import energy
-from experiments.evidence.verification.problems.friction_and_rolling import friction_and_rolling
 from experiments.evidence.verification.problems.heap_angle import heap_angle
 from experiments.evidence.verification.problems.janssen import janssen
 from experiments.evidence.verification.problems.lammps_contacts import lammps_contacts
@@ -28,7 +27,6 @@ PROBLEMS: dict[str, Problem] = {
     "oblique-impact": oblique_impact,
     "micro-slip": micro_slip,
     "spinning-impact": spinning_impact,
-    "friction-and-rolling": friction_and_rolling,
     "pair-laws": pair_laws,
     "rigid-body": rigid_body,
     "liggghts-contacts": liggghts_contacts,

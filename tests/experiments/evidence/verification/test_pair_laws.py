@@ -1,20 +1,24 @@
-"""Driven pairs: sets of laws give their closed forms, and a wrong law is seen."""
+"""Driven pairs: sets of laws give their theory in every motion, and a wrong theory is seen."""
 
 import numpy as np
 import pytest
 
-from dem_warp import PRESETS
-from experiments.evidence.verification.problems.pair_laws import driven, expected, pair_rows
+from experiments.evidence.verification.problems.pair_laws import THEORIES, driven, pair_rows, predicted
 
 
-@pytest.mark.parametrize("name", ["edem", "liggghts"])
-def test_a_set_of_laws_gives_its_closed_forms(name: str) -> None:
-    rows = pair_rows(name, "cpu")
-    assert len(rows) == 4
-    assert all(row.passed for row in rows), rows
+@pytest.mark.parametrize("name", ["edem", "yade", "relative with twisting"])
+def test_a_set_of_laws_gives_its_theory(name: str) -> None:
+    rows, _ = pair_rows(name, "cpu")
+    judged = [row for row in rows if row.tolerance is not None]
+    # all motions but the turn in plane; with the mechanism, the twist alone
+    assert len(judged) == (1 if "twisting" in name else 5)
+    assert all(row.passed for row in judged), judged
 
 
-def test_the_rolling_law_of_another_set_is_seen() -> None:
-    seen = driven(PRESETS["liggghts"], "rolling", "cpu")
-    want, size = expected("rolling", PRESETS["liggghts-cdt"])
-    assert np.abs(seen - want).max() > 0.5 * size
+def test_the_theory_of_another_set_is_seen() -> None:
+    courses, acted = driven("liggghts", "cpu")
+    for number, rolls, other in ((1, False, "edem"), (2, True, "liggghts-cdt")):
+        want = predicted(THEORIES[other], rolls, courses[number])
+        size = np.abs(want).max(axis=(0, 2, 3))
+        # a dashpot that friction does not limit, and a torque without a spring
+        assert (np.abs(acted[number] - want).max(axis=(0, 2, 3)) > 0.05 * size).any()
