@@ -74,9 +74,9 @@ fixed overlap (`yade`; `lammps`: and a dashpot), S_t R_r^2, 1/R_r = 1/l_1 + 1/l_
 sets have no term, and zero is expected.
 
 Stated, as theory is missed: *turned in plane*, a force should turn with the pair, but keeps its direction in
-space under every set, as in LIGGGHTS and LAMMPS; Yade turns it. And a pure twist rolls by nothing but
-rounding, which `edem-rvd` answers with its full torque across the line of centres; so does `deme` in
-production precision, where rounding passes its least speed of 1e-12 m/s."""
+space under every set. So it does in LIGGGHTS 3.8.0 and LAMMPS (29 Sep 2021), run for this; Yade 2023.02a
+turns it. And a pure twist rolls by nothing but rounding, which `edem-rvd` answers with its full torque across
+the line of centres; so does `deme` in production precision, where rounding passes its least speed, 1e-12 m/s."""
 
 
 def _cut(force: np.ndarray, limit: float) -> np.ndarray:
