@@ -76,7 +76,7 @@ sets have no term, and zero is expected.
 Stated, as theory is missed: *turned in plane*, a force should turn with the pair, but keeps its direction in
 space under every set. So it does in LIGGGHTS 3.8.0 and LAMMPS (29 Sep 2021), run for this; Yade 2023.02a
 turns it. And a pure twist rolls by nothing but rounding, which `edem-rvd` answers with its full torque across
-the line of centres; so does `deme` in production precision, where rounding passes its least speed, 1e-12 m/s."""
+the line of centres; so does `deme` in production precision, where rounding passes its 1e-12 m/s."""
 
 
 def _cut(force: np.ndarray, limit: float) -> np.ndarray:
