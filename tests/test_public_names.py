@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -49,20 +50,37 @@ def test_a_public_name_is_documented(name: str) -> None:
 
 
 def identifiers(tree: ast.AST) -> set[str]:
-    """Return the names and attributes in a piece of source."""
+    """Return the names in a piece of source, and its attributes with a point and without."""
     nodes = list(ast.walk(tree))
-    return {n.id for n in nodes if isinstance(n, ast.Name)} | {
-        n.attr for n in nodes if isinstance(n, ast.Attribute)
-    }
+    attributes = {n.attr for n in nodes if isinstance(n, ast.Attribute)}
+    return {n.id for n in nodes if isinstance(n, ast.Name)} | attributes | {f".{each}" for each in attributes}
+
+
+def parts_of(tree: ast.Module) -> Iterator[tuple[str, set[str]]]:
+    """Yield each function and class of a file, and with a point each member, with the names that it needs."""
+    for node in tree.body:
+        if not isinstance(node, ast.FunctionDef | ast.ClassDef):
+            continue
+        inner = node.body if isinstance(node, ast.ClassDef) else []
+        members = [n for n in inner if isinstance(n, ast.FunctionDef) and not n.name.startswith("__")]
+        yield from ((f".{member.name}", identifiers(member)) for member in members)
+        own = [n for n in ast.iter_child_nodes(node) if n not in members]
+        yield node.name, {name for each in own for name in identifiers(each)}
+
+
+def named_in(text: str) -> set[str]:
+    """Return, with a point, the attributes and the texts of one word in a piece of source."""
+    nodes = list(ast.walk(ast.parse(text)))
+    words = {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+    return {f".{each}" for each in words | {n.attr for n in nodes if isinstance(n, ast.Attribute)}}
 
 
 def test_commands_reach_every_public_name_of_the_statistics() -> None:
-    """A command or a campaign imports it, or something that it imports needs it."""
+    """A command or a campaign imports it or names the member, or something that it imports needs it."""
     parts: dict[str, set[str]] = {}
     for path in (ROOT / "doe").rglob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                parts[node.name] = parts.get(node.name, set()) | identifiers(node)
+        for name, needed in parts_of(ast.parse(path.read_text(encoding="utf-8"))):
+            parts[name] = parts.get(name, set()) | needed
     product = [p for p in (ROOT / "experiments").rglob("*.py") if "evidence" not in p.parts]
     texts = [p.read_text(encoding="utf-8") for p in product]
     sources = [ast.parse(text) for text in texts if re.search(r"import doe|from doe|plots\.", text)]
@@ -71,11 +89,14 @@ def test_commands_reach_every_public_name_of_the_statistics() -> None:
     for tree in sources:
         chains = [n for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
         todo |= {n.attr for n in chains if isinstance(n.value, ast.Name) and n.value.id in ("doe", "plots")}
+    todo |= {name for text in texts for name in named_in(text)}
     reached: set[str] = set()
     while todo := (todo - reached) & parts.keys():
         reached |= todo
         todo = {name for part in todo for name in parts[part]}
     for package in ("doe", "doe.plots"):
         named = import_module(package)
-        public = {name for name in named.__all__ if callable(getattr(named, name))}
-        assert public - reached == set()
+        public = {name: each for name in named.__all__ if callable(each := getattr(named, name))}
+        members = {f".{name}" for each in public.values() if isinstance(each, type) for name in vars(each)}
+        wanted = public.keys() | {name for name in members & parts.keys() if name[1] != "_"}
+        assert wanted - reached == set()

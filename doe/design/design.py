@@ -1,7 +1,7 @@
 """Design: the settings of every run, coded and natural, with the order in which to run them."""
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -137,10 +137,12 @@ class Design:
 
     @cached_property
     def run_order(self) -> pd.Index:
-        """Run labels in the order of execution: ``design.natural.loc[design.run_order]``."""
+        """Run labels in the order of execution, by blocks: ``design.natural.loc[design.run_order]``."""
         if self.seed is None:
             return self.coded.index
         order = np.random.default_rng(int(self.seed)).permutation(len(self.coded))
+        if self.blocks is not None:
+            order = order[np.argsort(pd.factorize(self.blocks)[0][order], kind="stable")]
         return self.coded.index[order]
 
     def factor(self, name: str) -> Factor:
@@ -165,16 +167,6 @@ class Design:
         table = numbered(self.coded.loc[runs])
         blocks = None if self.blocks is None else self.blocks.loc[runs].set_axis(table.index)
         return Design(self.factors, table, dummies=self.dummies, blocks=blocks)
-
-    def with_blocks(self, labels: Sequence) -> "Design":
-        """Return the design with these blocks: a label for each run, in the order of the runs."""
-        labels = arguments.checked_list("blocks", labels)
-        if len(labels) != len(self.coded):
-            raise DesignError(
-                f"blocks must be one label for each of {len(self.coded)} runs, got {len(labels)}"
-            )
-        blocks = pd.Series(labels, index=self.coded.index)
-        return replace(self, blocks=blocks)
 
 
 def design_of_blocks(

@@ -161,7 +161,7 @@ def two_level_factors(factors: Iterable[Factor], what: str) -> tuple[Factor, ...
         if isinstance(factor, Category) and len(factor.levels) > 2:
             raise DesignError(
                 f"{what} has two levels a factor; category {factor.name!r} has {len(factor.levels)} "
-                "(fit_formula takes them by name)"
+                "(a formula takes them by name)"
             )
     return factors
 

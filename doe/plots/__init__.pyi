@@ -15,6 +15,7 @@ from .palette import ORANGE as ORANGE
 from .palette import VERMILION as VERMILION
 from .screening_plots import half_normal_plot as half_normal_plot
 from .screening_plots import pareto_chart as pareto_chart
+from .screening_plots import precision_plot as precision_plot
 from .style import WIDTH as WIDTH
 from .surface_plots import contour_plot as contour_plot
 from .surface_plots import residual_plots as residual_plots

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from doe.arguments import checked_kind, checked_list
+from doe.design.families.quality import DesignQuality
 from doe.errors import DesignError
 from doe.plots.palette import BLUE, MUTED, ORANGE
 from doe.plots.plot_data import half_normal_points, pareto_points
@@ -43,6 +45,18 @@ def pareto_chart(
     key(figure, axes, given, handles, 3)
     axes.set(xlabel="factor", ylabel=f"|t| of the effect ({result.error_df:g} df)")
     axes.margins(y=0.12)
+    plain(axes)
+    return figure
+
+
+def precision_plot(quality: DesignQuality, axes: Axes | None = None) -> Figure:
+    """Draw the standard error of a fitted mean, for an error of 1, that shares of the box stay below."""
+    errors = np.sqrt(checked_kind("quality", quality, DesignQuality).variances)
+    figure, axes = canvas(axes, 3.2)
+    axes.plot(np.linspace(0.0, 100.0, len(errors)), errors, color=BLUE)
+    axes.axhline(float(np.median(errors)), color=MUTED, linestyle="--", linewidth=1.0)
+    axes.set(xlabel="share of the box [%]", ylabel="standard error of the mean", xlim=(0.0, 100.0))
+    axes.set_ylim(bottom=0.0)
     plain(axes)
     return figure
 

@@ -36,11 +36,6 @@ class StationaryPoint:
     curvatures: NDArray[np.float64]
     """Eigenvalues of the quadratic form in coded units, ascending."""
 
-    @property
-    def inside(self) -> bool:
-        """True if it is in the coded box -1..+1."""
-        return bool((self.coded.abs() <= 1.0).all())
-
 
 def nearest(
     surface: FittedSurface, target: float, to: Mapping[str, float] | None = None, extent: float = 1.0
@@ -82,10 +77,11 @@ def stationary_point(surface: FittedSurface) -> StationaryPoint:
     curvatures, directions = np.linalg.eigh(form.matrix)
     scale = max(np.abs(curvatures).max(), np.abs(form.slopes).max())
     if np.abs(curvatures).min() <= FLAT_RATIO * scale:
-        direction = directions[:, np.abs(curvatures).argmin()].round(3)
+        flat = zip(surface.design.names, directions[:, np.abs(curvatures).argmin()], strict=True)
         raise DesignError(
             "a stationary point requires curvature in every direction; the fitted surface is straight along "
-            f"{dict(zip(surface.design.names, direction.tolist(), strict=True))} (coded)"
+            + ", ".join(f"{share:+.3g} {name}" for name, share in flat)
+            + " (coded)"
         )
     point = np.linalg.solve(form.matrix, -0.5 * form.slopes)
     kind = "minimum" if curvatures.min() > 0.0 else "maximum" if curvatures.max() < 0.0 else "saddle"

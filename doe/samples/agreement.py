@@ -72,11 +72,6 @@ class Agreement:
         return self._misfit(0.0)
 
     @cached_property
-    def rmse_without_own_noise(self) -> Estimate:
-        """Root mean square of the differences without the noise of the values (``rmse_without_noise``)."""
-        return self._misfit(float(self.value_variance.mean()))
-
-    @cached_property
     def rmse_without_noise(self) -> Estimate:
         """Root mean square of the differences of these runs without the noise of either side.
 

@@ -183,8 +183,9 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
         ``"lenth"``: Lenth's pseudo standard error (Technometrics 31, 1989, p. 469), for a design without
         dummies in which few effects are active, with limits drawn from inert effects (Ye and Hamada, Journal
         of Quality Technology 32, 2000, p. 57); ``"pooled"``: the whole residual, dummies and replicates
-        together; ``"pure"``: the replicates alone. Default: the dummies, without dummies Lenth's. Both keep
-        their level when two factors interact in 12 runs; against the replicates a strong interaction is found
+        together; ``"pure"``: the replicates alone. Default: the dummies; without them what the factors leave
+        of the runs' means, which interactions make larger; Lenth's where nothing is left. All keep their
+        level when two factors interact in 12 runs; against the replicates a strong interaction is found
         significant on whichever column it falls.
 
     Raises

@@ -49,7 +49,7 @@ Dummies = Annotated[
     typer.Option("--dummy", metavar="NAME", help="A column without factor. Default: dummy 1, ..."),
 ]
 Block = Annotated[str | None, typer.Option(help="Column of the blocks. Default: block.", metavar="NAME")]
-Alpha = Annotated[float, typer.Option(help="Level of the tests and intervals.")]
+Alpha = Annotated[float, typer.Option(help="Level of the tests and intervals.", min=1e-9, max=0.999)]
 Model = Annotated[
     str,
     typer.Option(
@@ -123,7 +123,8 @@ def screen(
     error: Annotated[
         str | None,
         typer.Option(
-            help="Error of the tests: dummies, lenth, pooled or pure. Default: dummies, else lenth."
+            help="Error of the tests: dummies, lenth, pooled or pure. Default: dummies, or what the factors "
+            "leave; lenth where they leave nothing."
         ),
     ] = None,
     alpha: Alpha = 0.05,
@@ -245,15 +246,17 @@ def compare(
     table: Table,
     value: Annotated[str, typer.Option(metavar="NAME", help="Column to judge, e.g. simulated.")],
     reference: Annotated[str, typer.Option(metavar="NAME", help="Column to judge it by, e.g. measured.")],
+    value_sd: Annotated[float, typer.Option(help="Noise of one value, a standard deviation.", min=0.0)] = 0.0,
+    reference_sd: Annotated[float, typer.Option(help="Noise of one reference value.", min=0.0)] = 0.0,
     out: OutFolder = None,
     as_json: AsJson = False,
 ) -> None:
     """Compare two columns run by run: bias, difference, slope and rank correlation."""
     with clear_errors():
         from experiments.commands.tables.answers import compare_columns
+        from experiments.commands.tables.sheet import read_columns
 
-        sheet = _sheet(table, None, [value, reference])
-        answer = compare_columns(sheet, *sheet.responses.columns)
+        answer = compare_columns(read_columns(table, [value, reference]), value_sd, reference_sd)
     _show(answer, out, as_json, str(table))
 
 

@@ -3,6 +3,7 @@
 import datetime
 import inspect
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +84,7 @@ RIGHT_VALUES: list[tuple[Any, str]] = [
     (POINT, "point points at to truth"),
     (SCREEN, "result steepest_path.fit"),
     (AGREED, "agreement_plot.result"),
+    (doe.design_quality(DESIGN), "quality"),
     (PATH, "path"),
     (REGION, "region"),
     (TARGET, "Goal.target agrees.target"),
@@ -153,7 +155,7 @@ PUBLIC = [
 DRAWN = [getattr(plots, name) for name in plots.__all__ if name.endswith(("_plot", "_plots", "_chart"))]
 MEMBERS: list[tuple[Any, str]] = [
     (doe, "Mixture Factor Category Sample Goal Wish Design"),
-    (DESIGN, "from_table select with_blocks factor"),
+    (DESIGN, "from_table select factor"),
     (SURFACE, "predict evaluate reduce equation agrees compatible_region band nearest contour"),
     (REGION, "axis projection"),
     (JOINT, "agrees band"),
@@ -286,8 +288,7 @@ DESIGNS = [
     (lambda: doe.Mixture(BLENDED, {}), "add up to 1"),
     (lambda: doe.simplex_centroid(["a", "b"], lower={"a": 0.6, "b": 0.5}), "less than 1"),
     (lambda: DESIGN.select([20]), "no run 20"),
-    (lambda: DESIGN.with_blocks(["a"]), "one label for each of 19 runs"),
-    (lambda: DESIGN.with_blocks([None] + ["a"] * 18), "run 1 has no block"),
+    (lambda: replace(DESIGN, blocks=BLOCKS.where(BLOCKS.index > 1)), "run 1 has no block"),
     (
         lambda: doe.Design(DESIGN.factors, DESIGN.coded, blocks=BLOCKS.reset_index(drop=True)),
         "by the runs' labels",

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy import stats
 from scipy.stats import qmc
 
@@ -34,8 +35,8 @@ class DesignQuality:
     """p / (N trace (X'X)^-1) in percent, the same scale."""
     g_efficiency: float
     """p / (N largest prediction variance in the box) in percent."""
-    prediction_variance: float
-    """Variance of a prediction, averaged over the box."""
+    variances: NDArray[np.float64]
+    """Variances of predictions at points spread over the box, ascending."""
     vif: pd.Series
     """Variance inflation of each coefficient by the others: 1 for orthogonal ones."""
 
@@ -43,7 +44,7 @@ class DesignQuality:
         worst = f"{self.vif.idxmax()} {self.vif.max():.2f}" if len(self.vif) else "none"
         return (
             f"D {self.d_efficiency:.1f} %, A {self.a_efficiency:.1f} %, G {self.g_efficiency:.1f} %; mean "
-            f"prediction variance {self.prediction_variance:.3f} of one observation's; largest VIF {worst}"
+            f"prediction variance {self.variances.mean():.3f} of one observation's; largest VIF {worst}"
         )
 
 
@@ -81,7 +82,7 @@ def design_quality(
         d_efficiency=float(100.0 * np.exp(log_determinant / count) / runs),
         a_efficiency=float(100.0 * count / (runs * np.trace(inverse))),
         g_efficiency=float(100.0 * count / (runs * variance.max())),
-        prediction_variance=float(average.mean()),
+        variances=np.sort(average),
         vif=_inflation(columns, inverse),
     )
 

@@ -65,11 +65,6 @@ class Noise:
         return max(freedom - 2.0, 1.0) / max(freedom - count - 1.0, 1.0)
 
 
-def fit_noise(theta: np.ndarray, deviations: np.ndarray, floor: np.ndarray) -> Noise:
-    """Fit a covariance to independent deviations of mean zero (`fit_noises`, for one condition)."""
-    return fit_noises([(theta, deviations)], floor)[0]
-
-
 def fit_noises(repeats: Sequence[tuple[np.ndarray, np.ndarray]], floor: np.ndarray) -> list[Noise]:
     """Fit the covariances of some conditions together.
 

@@ -68,5 +68,11 @@ def _page(answer: Answer, pictures: list[tuple[str, str]], source: str) -> str:
 
 def _laid_out(name: str, caption: str, table: pd.DataFrame) -> Table:
     frame = indexed(table)
-    kinds = {head: "free" if pd.api.types.is_float_dtype(frame[head]) else "text" for head in frame.columns}
-    return make_table(name, frame, [Column(head, str(head), kind) for head, kind in kinds.items()], caption)
+    columns = [Column(head, str(head), _kind(frame[head])) for head in frame.columns]
+    return make_table(name, frame, columns, caption)
+
+
+def _kind(column: pd.Series) -> str:
+    if not pd.api.types.is_float_dtype(column):
+        return "text"
+    return "count" if (column.dropna() % 1.0 == 0.0).all() else "free"

@@ -17,6 +17,7 @@ from doe import (
     ClimbPath,
     Design,
     DesignError,
+    DesignQuality,
     Estimate,
     LinearFit,
     Mixture,
@@ -88,7 +89,11 @@ def describe_design(design: Design | Mixture, model: str, sd: float | None, effe
     answer.notes += design.notes
     if all(not isinstance(f, Category) or len(f.levels) == 2 for f in design.factors):
         answer.add("aliases", "Effects that the design mixes up.", lambda: _alias_table(design))
-    answer.add("quality", "Efficiencies for the model.", lambda: _quality_table(design, model))
+    caption = "Efficiencies for the model."
+    if quality := answer.made(caption, lambda: doe.design_quality(design, model)):
+        answer.tables["quality"] = caption, _quality_table(quality)
+        caption = "Standard error of the fitted mean, for an error of 1, that shares of the box stay below."
+        answer.draw("precision", caption, lambda: plots.precision_plot(quality))
     sizes = (effect,) if effect is not None else (1.0, 2.0) if sd is None else (sd, 2.0 * sd)
     answer.add(
         "power",
@@ -106,8 +111,7 @@ def _alias_table(design: Design) -> pd.DataFrame:
     return structure.matrix.rename_axis("effect")
 
 
-def _quality_table(design: Design, model: str) -> pd.DataFrame:
-    quality = doe.design_quality(design, model)
+def _quality_table(quality: DesignQuality) -> pd.DataFrame:
     rows = {f"{letter} efficiency": getattr(quality, f"{letter.lower()}_efficiency") for letter in "DAG"}
     rows |= {f"variance inflation of {name}": value for name, value in quality.vif.items()}
     return pd.Series(rows).rename_axis("measure").to_frame("value")
@@ -121,17 +125,22 @@ def screen_table(sheet: Sheet, name: str, error: str | None, alpha: float) -> An
     answer.tables["effects"] = "Effects, largest first.", result.table.sort_values("rank")
     answer.tables["anova"] = "Analysis of variance.", result.anova
     answer.add("aliases", "Effects that the design mixes up.", lambda: _alias_table(design))
+    caption, drawn = "Effects with interactions, tested by Lenth's method.", None
     if not design.dummies:
-        answer.add(
-            "interactions", "Effects with interactions, tested by Lenth's method.",
-            lambda: doe.two_level_effects(design, values).table,
-        )  # fmt: skip
+        drawn = answer.made(caption, lambda: doe.two_level_effects(design, values))
+    if drawn:
+        answer.tables["interactions"] = caption, drawn.table
+        found = drawn.table[["effect", "ratio", "p"]].to_string(float_format="{:.4g}".format)
+        answer.texts.append(f"{caption}\n{found}")
     answer.add("climb", "Steepest climb from the center.", lambda: _climb(result))
     answer.draw("pareto", "Effects and the limits of the test.", lambda: plots.pareto_chart(result))
-    answer.draw("half_normal", "Half-normal plot.", lambda: plots.half_normal_plot(result, name))
+    answer.draw("half_normal", "Half-normal plot.", lambda: plots.half_normal_plot(drawn or result, name))
     _add_means(answer, design, values, name, list(result.table.sort_values("rank").index))
     found = ", ".join(result.significant(alpha)) or "none"
     answer.notes.insert(0, f"Significant at {alpha:g}: {found}.")
+    if drawn:
+        found = ", ".join(drawn.significant(alpha)) or "none"
+        answer.notes.insert(1, f"Significant at {alpha:g} with interactions, by Lenth's method: {found}.")
     return answer
 
 
@@ -169,14 +178,17 @@ def climb_runs(sheet: Sheet, name: str, target: float) -> Answer:
     return answer
 
 
-def compare_columns(sheet: Sheet, value: str, reference: str) -> Answer:
-    """Compare a response with its reference, run by run."""
-    both = sheet.responses[[value, reference]].dropna()
-    result = doe.agreement(both[value], both[reference])
+def compare_columns(both: pd.DataFrame, value_sd: float, reference_sd: float) -> Answer:
+    """Compare a column with its reference, the next one, run by run."""
+    value, reference = both
+    result = doe.agreement(both[value], both[reference], value_sd**2, reference_sd**2)
     rows = {
         "runs": result.runs, "bias": result.bias, "root mean square difference": result.rmse,
         "slope": result.slope, "rank correlation": result.spearman,
     }  # fmt: skip
+    if value_sd or reference_sd:
+        rows["root mean square difference without noise"] = result.rmse_without_noise
+        rows["rank correlation of a perfect model"] = result.spearman_ceiling
     estimates = {
         name: vars(each) if isinstance(each, Estimate) else {"value": each} for name, each in rows.items()
     }

@@ -17,11 +17,13 @@ from experiments.io.texts import is_number, nearest_name, number
 
 RUN = ("run", "std", "stdorder", "std order", "standard order")
 """Heads of the column with the runs' labels, in small letters."""
-ORDER = ("order", "runorder", "run order", "pttype")
+ORDER = ("order", "runorder", "run order", "pttype", "pattern", "space type")
 """Heads of columns that other programs write and no analysis needs."""
 BLOCK = ("block", "blocks")
 DUMMY = re.compile(r"(dummy|d)[ _-]?\d+", re.IGNORECASE)
 HEAD = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]")
+LETTER = re.compile(r"^[A-Z]: ?(?=.)")
+"""Letter of a factor that Design-Expert writes before its name, which a model's terms could not have."""
 LEVELS = re.compile(r"(?P<low>[-+.\deE]+)\s*\.\.\s*(?P<high>[-+.\deE]+)\s*(?P<unit>.*)")
 
 
@@ -97,6 +99,15 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     return Sheet(path, design, numbers[responses])
 
 
+def read_columns(path: Path, names: Sequence[str]) -> pd.DataFrame:
+    """Read different columns of numbers by their names, in the rows that have all of them."""
+    frame, places = read_frame(path)
+    heads = [_known(path, frame, name) for name in names]
+    if len(set(heads)) < len(heads):
+        raise InputError(str(path), "needs different columns", ", ".join(names))
+    return pd.DataFrame({head: _numbers(frame, head, places) for head in heads}).dropna()
+
+
 def read_mixture(path: Path, responses: Sequence[str]) -> tuple[Mixture, pd.Series]:
     """Read a table of blends, whose other columns are the components' shares."""
     frame, places = read_frame(path)
@@ -131,7 +142,7 @@ def _one(path: Path, frame: pd.DataFrame, given: str | None, usual: Sequence[str
 
 
 def _split_head(head: str) -> tuple[str, str]:
-    parts = HEAD.fullmatch(head)
+    parts = HEAD.fullmatch(head := LETTER.sub("", head))
     return (parts["name"], parts["unit"].strip()) if parts else (head, "")
 
 

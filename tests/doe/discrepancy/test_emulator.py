@@ -14,7 +14,7 @@ from synthetic_world import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulato
 from doe.discrepancy import Bank, Outcomes, bank_points, fit_emulator, fitted, load_bank, make_bank
 from doe.discrepancy.emulation import kriged_parts, surface_fits
 from doe.discrepancy.emulation.kriged_parts import KrigedParts
-from doe.discrepancy.emulation.run_noise import ALIKE, fit_noise
+from doe.discrepancy.emulation.run_noise import ALIKE, fit_noises
 from doe.discrepancy.emulation.surface_fits import AddedRuns, BaseRuns, fit_additions, fit_bases
 from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import gather
@@ -240,7 +240,7 @@ def test_the_scatter_under_a_mechanism_has_a_correlation_of_its_own() -> None:
     """Size decides, as far as its runs outweigh those that the base's correlation is worth."""
     rng, count = np.random.default_rng(11), 300
     theta, size = rng.uniform(-1.0, 1.0, (count, 1)), rng.uniform(0.0, 1.0, count)
-    noise = fit_noise(theta, rng.standard_normal((count, 2)), np.full(2, 1e-9))
+    [noise] = fit_noises([(theta, rng.standard_normal((count, 2)))], np.full(2, 1e-9))
     [base] = fit_bases([BaseRuns.of(theta, rng.standard_normal((count, 2)), noise)])
     triangle = np.linalg.cholesky([[1.0, 0.8], [0.8, 1.0]])
     alike = size[:, None] + rng.standard_normal((count, 2)) @ triangle.T

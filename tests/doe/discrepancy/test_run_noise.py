@@ -8,10 +8,14 @@ from scipy import stats
 
 from doe.discrepancy.emulation import run_noise
 from doe.discrepancy.emulation.condition_surfaces import polynomial
-from doe.discrepancy.emulation.run_noise import ALIKE, fit_noise, fit_noises, shared_correlations
+from doe.discrepancy.emulation.run_noise import ALIKE, Noise, fit_noises, shared_correlations
 from doe.discrepancy.emulation.surface_fits import BaseRuns, fit_bases, repeats_of, shared_misfits
 
 FLOOR = np.full(6, 1e-9)
+
+
+def fit_noise(theta: np.ndarray, deviations: np.ndarray, floor: np.ndarray) -> Noise:
+    return fit_noises([(theta, deviations)], floor)[0]
 
 
 def test_deviations_of_repeats_have_the_covariance_of_one_run() -> None:

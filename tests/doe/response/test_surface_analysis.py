@@ -1,6 +1,9 @@
 """Analysis beyond the fit: shape, optima, desirability, diagnostics, formulas, effects."""
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 
 import doe
@@ -22,17 +25,15 @@ def test_blocks_are_a_term_and_dummies_are_named():
     labels = ["day 1"] * 6 + ["day 2"] * 7
     shifted = response + 3.0 * (np.array(labels) == "day 2")
     plain = fit_surface(design, shifted)
-    blocked = fit_surface(design.with_blocks(labels), shifted)
+    table = design.points.assign(block=labels)
+    blocked = fit_surface(Design.from_table(table, design.factors, coded=True, block="block"), shifted)
     assert blocked.residual_ms < 0.01 < plain.residual_ms
     assert blocked.anova.loc["blocks", "df"] == 1
     assert blocked.anova.loc["blocks":"model", "sum_sq"].sum() + blocked.anova.loc["residual", "sum_sq"] == (
         pytest.approx(blocked.anova.loc["total", "sum_sq"], rel=1e-12)
     )
-    table = design.points.assign(block=labels)
     with pytest.raises(DesignError, match=r"column 'block' is no factor.*block='block'"):
         Design.from_table(table, design.factors, coded=True)
-    again = Design.from_table(table, design.factors, coded=True, block="block")
-    assert fit_surface(again, shifted).residual_ms == pytest.approx(blocked.residual_ms, rel=1e-12)
 
 
 def test_canonical_analysis_finds_the_drawn_shape():
@@ -184,7 +185,8 @@ def test_terms_may_be_written():
 
 def test_formulas_take_categories_and_blocks():
     variety = doe.Category("variety", ["old", "new", "wild"])
-    design = doe.full_factorial([Factor("t", 20.0, 30.0), variety], levels=3).with_blocks(["m", "n", "m"] * 3)
+    design = doe.full_factorial([Factor("t", 20.0, 30.0), variety], levels=3)
+    design = replace(design, blocks=pd.Series(["m", "n", "m"] * 3, index=design.coded.index))
     shift = design.natural["variety"].map({"old": 0.0, "new": 2.0, "wild": -1.0}).to_numpy()
     response = 5.0 + 1.5 * design.points["t"].to_numpy() + shift + 4.0 * (design.blocks == "n").to_numpy()
     response = response + np.random.default_rng(2).normal(scale=0.01, size=9)
@@ -195,7 +197,7 @@ def test_formulas_take_categories_and_blocks():
     assert "C(variety)" in fit.summary()
     row = fit.predict({"t": 0.0, "variety": "wild", "block": "m"}).iloc[0]
     assert row["mean"] == pytest.approx(4.0, abs=0.05)
-    with pytest.raises(DesignError, match="fit_formula takes them by name"):
+    with pytest.raises(DesignError, match="a formula takes them by name"):
         fit_surface(design, response)
     for bad in ("t ~ variety", "t +", "t + nonsense"):
         with pytest.raises(DesignError):

@@ -1,6 +1,8 @@
 """``dem-warp doe``: the numbers that R prints for the same tables, every kind of design, what is refused."""
 
 import json
+import re
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +110,42 @@ def test_a_screening_names_the_effect_that_was_put_in() -> None:
     }
 
 
+def test_an_unreplicated_factorial_is_tested_with_its_interactions() -> None:
+    """The filtration rate of Montgomery, Design and Analysis of Experiments, 2005, example 6-2."""
+    rates = [45, 71, 48, 65, 68, 60, 80, 65, 43, 100, 45, 104, 75, 86, 70, 96]
+    runs = [[*reversed(levels), rate] for levels, rate in zip(product((-1, 1), repeat=4), rates, strict=True)]
+    table = pd.DataFrame(runs, columns=["A:Temp [C]", "B:Pressure", "C:Conc", "D:Stirring", "rate"])
+    pattern = ["".join("-+"[level > 0] for level in row[:4]) for row in runs]
+    table.assign(Pattern=pattern)[["Pattern", *table]].to_csv("runs.csv", index=False)
+    code, said, notes = dem_warp("doe", "screen", "runs.csv", "--out", "screening")
+    assert code == 0
+    interactions = pd.read_csv("screening/tables/interactions.csv", index_col=0)["effect"]
+    published = {
+        "Temp": 21.625, "Temp:Conc": -18.125, "Temp:Stirring": 16.625, "Stirring": 14.625, "Conc": 9.875,
+    }  # fmt: skip
+    assert interactions.head(5).to_dict() == pytest.approx(published, rel=1e-12)  # rounding
+    assert f"by Lenth's method: {', '.join(published)}." in " ".join(notes.split())
+    assert re.search(r"^Temp:Conc +-18.12 ", said, re.MULTILINE)
+
+
+def test_a_design_is_done_block_by_block_and_its_precision_is_drawn() -> None:
+    words = ("--blocks", 2, "--seed", 5, "--out", "ccd")
+    runs = answered("design", "central-composite", *factors(3), *words)["runs"]
+    assert (runs["block"].diff() != 0).sum() == 2  # the first row, and the change
+    assert list(runs.index) != sorted(runs.index)
+    assert Path("ccd/plots/precision.png").is_file()
+
+
+def test_noise_is_taken_out_of_a_comparison() -> None:
+    """Differences of 1 that a noise of 1 explains leave nothing, and a perfect model ranks below 1."""
+    pd.DataFrame({"a": range(20), "b": [n + (-1) ** n for n in range(20)]}).to_csv("runs.csv", index=False)
+    words = ("--value", "a", "--reference", "b", "--reference-sd", 1)
+    found = answered("compare", "runs.csv", *words)["agreement"]["value"]
+    assert found["root mean square difference"] == pytest.approx(1.0, rel=1e-12)
+    assert found["root mean square difference without noise"] < 0.2
+    assert 0.9 < found["rank correlation of a perfect model"] < 1.0
+
+
 def test_the_optimum_of_a_known_bowl() -> None:
     """Rounding alone: the responses are a quadratic and a plane."""
     answered("design", "central-composite", *factors(2), "--out", "ccd")
@@ -160,6 +198,8 @@ def test_columns_of_other_programs_are_not_factors() -> None:
         ("A,y\n1,2\n2,3\n", ["optimum", "--wish", "y=max:3..high"], "numbers as the ends of its scale"),
         ("A,y\n1,2\n2,3\n", ["fit", "--formula", "A", "--reduce"], "--reduce: needs a polynomial"),
         ("A,y\n1,2\n2,3\n", ["screen", "--error", "mine"], "error"),
+        ("A,y\n1,2\n2,3\n", ["fit", "--alpha", "2"], "--alpha"),
+        ("A,y\n1,2\n", ["compare", "--value", "y", "--reference", "y"], "needs different columns, got y, y"),
         ("A,y\n1,2\n2,3\n3,5\n", ["fit", "--model", "A", "--out", "."], "must be a new or an empty folder"),
     ],
 )  # fmt: skip
