@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from experiments.calibrate.campaign import Campaign
-from experiments.calibrate.plan.choice import TestPlan, make_plan
+from experiments.calibrate.plan.choice import ASSUMED, TestPlan, make_plan
+from experiments.calibrate.plan.knowledge import Size
 from experiments.calibrate.plan.present import fit_responses, present_of
 from experiments.report.kit.html import Chapter, render_page
 from experiments.report.kit.sentences import say
@@ -30,16 +31,19 @@ def next_test(campaign: Campaign, study: Study) -> TestPlan | None:
     read = (one.response for each in study.candidates for one in each.readings)
     new = [one for one in read if one.scene in scenes and (one.scene, one.observable) not in present.known]
     fits = fit_responses(surface.design, surface.cases, new, study.campaign.surface)
-    return make_plan(present, *fits, study.candidates, {}, study.campaign.optimum)
+    sizes = {each.name: (Size(seconds=0.0),) for each in study.candidates}  # all are simulated already
+    return make_plan(present, *fits, study.candidates, sizes, study.campaign.optimum)
 
 
 def next_test_chapters(campaign: Campaign, study: Study) -> Iterable[Chapter]:
     """Yield the chapter on the next test of a campaign, if its study has candidates."""
     if plan := next_test(campaign, study):
-        yield _chapter(plan, f"{plan.sentence} {' '.join(plan.notes)}")
+        assumed = [note for note in plan.notes if note.startswith(ASSUMED)]
+        doubts = [note for note in plan.notes if note not in assumed]
+        yield _chapter(plan, " ".join([plan.sentence, *doubts]), " ".join(assumed))
 
 
-def _chapter(plan: TestPlan, text: str = "") -> Chapter:
+def _chapter(plan: TestPlan, text: str = "", assumed: str = "") -> Chapter:
     shown: Layout = [
         "tests",
         *columns("count", minutes="laboratory minutes"),
@@ -48,5 +52,5 @@ def _chapter(plan: TestPlan, text: str = "") -> Chapter:
         Column("open", "stays open"),
     ]
     caption = "95 % half widths over the values, which hold in 80 % of the cases."
-    table = make_table("plan", plan.table, shown, caption, say("note.plan"))
+    table = make_table("plan", plan.table, shown, caption, f"{say('note.plan')} {assumed}".strip())
     return Chapter("next_test", "Next test", {"plan": table}, text=text)

@@ -182,6 +182,7 @@ def _reading(
 ) -> Reading:
     """Build a reading; what is assumed is added to the list."""
     model, errors = _defaults()["model"]["scene" if response.scene else "direct"], []
+    said: dict[str, list[str]] = {}
     for key, defaults in {"sd": own, "common": own, "model_sd": model}.items():
         given: Mapping[str, Quantity] = getattr(section, key) or {}
         if not set(given) <= {"", *section.observables}:
@@ -189,7 +190,7 @@ def _reading(
         error = given.get(response.observable, given.get(""))
         if error is None:
             error = Quantity.parse(defaults[key])
-            assumed.append(f"{response.name}: {key} {defaults[key]} ({defaults['source']})")
+            said.setdefault(defaults["source"], []).append(f"{key} {defaults[key]}")
         share = error.unit == SHARE
         try:
             errors.append(Error(error.number / 100.0 if share else to_number(error), share))
@@ -197,6 +198,7 @@ def _reading(
             raise ValueError(f"{key} {problem}, got {error}") from None
         if key != "common" and not errors[-1].size > 0.0:
             raise ValueError(f"{key} must be positive")
+    assumed += [f"{response.name}: {', '.join(errors)} ({source})" for source, errors in said.items()]
     return Reading(response, *errors)
 
 

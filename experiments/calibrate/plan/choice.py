@@ -26,6 +26,9 @@ GAIN, AS_GOOD = 0.05, 0.02
 LARGER, WORTH = (2.0, 5.0, 10.0, 20.0, 50.0, 100.0), 0.8
 """Growths that are tried of a test that buys nothing, and the share of the region that one must leave."""
 
+ASSUMED = "Assumed"
+"""First word of the notes on what no candidate states."""
+
 CHUNK = 64
 """Sets that are evaluated at once."""
 
@@ -184,7 +187,7 @@ def make_plan(
     notes = [apart] * (present.share == 0.0)
     notes += [said for each in ranked if each.scene and (said := _too_small(choice, each))]
     notes += [f"Not judged: {name}: {reason}." for name, reason in why.items()]
-    notes += dict.fromkeys(f"Assumed: {text}." for each in ranked for text in each.assumed)
+    notes += dict.fromkeys(f"{ASSUMED}: {text}." for each in ranked for text in each.assumed)
     return TestPlan(present, table, chosen, tuple(notes))
 
 

@@ -86,6 +86,7 @@ def test_a_plan_after_a_campaign_takes_its_region(
     page = (campaign / "report.html").read_text(encoding="utf-8")
     assert "Next test: " in page
     assert "Not judged: wide: it was not simulated: run dem-warp plan" in page
+    assert page.index("Next test: ") < page.index("computer time") < page.index("Assumed: ")
     del seeds[:]
     found = planned(study, "--after", campaign, "--out", tmp_path / "plan")
     assert len(seeds) == 9  # the target is known

@@ -38,7 +38,7 @@ def test_what_a_candidate_does_not_state_is_assumed_and_said_so(write_study: Wri
     assert (found.name, found.factor, found.scene) == ("sledge of E", "E", "")
     assert min(each.at(np.array(0.4)) for each in (reading.sd, reading.common, reading.model_sd)) > 0.0
     said = "; ".join(found.assumed)
-    for part in ("E_sledge: sd", "E_sledge: common", "E_sledge: model_sd 5 %", "sledge: minutes"):
+    for part in ("E_sledge: sd 15 %, common 4 % (", "E_sledge: model_sd 5 % (", "sledge: minutes"):
         assert part in said
 
 
