@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from experiments.report.material_card import CARD
 from experiments.runs.choices import Prepared, prepare
 from experiments.runs.request import RunRequest
 from experiments.runs.run_folder import open_run
+from experiments.studyfile.campaign import Response
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,14 +96,14 @@ def run_bridge(prepared: PreparedBridge) -> Bridge:
 
     Raise InputError when the folder cannot be used; nothing is written then.
     """
-    order = prepared.order
+    order, source = prepared.order, prepared.source
+    matched = Response(source.response, source.observable, source.unit)
     with open_run("bridge", prepared.run) as run:
         program = getattr(run.store.engine, "program", None)
         engine = run.study.engine and run.study.engine.name
-        name = engine or str(getattr(program, "name", order.command))
-        crossing = cross(
-            prepared.source, run.run_cases, name, order.runs, order.fresh, prepared.margin, order.seed
-        )
+        name = engine or str(getattr(program, "name", order.command or "a program by hand"))
+        runner = partial(run.run_cases, asked_for=(matched,))
+        crossing = cross(source, runner, name, order.runs, order.fresh, prepared.margin, order.seed)
         with run.publishing() as drafts:
             write_crossing(crossing, drafts)
     return Bridge(run.folder, crossing)

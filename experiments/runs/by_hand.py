@@ -30,7 +30,7 @@ from experiments.measurement.photographs import PictureOptions, angle_of, measur
 from experiments.measurement.value_limits import limits_of_test
 from experiments.runs.request import AwaitingRuns
 from experiments.studyfile import Study
-from experiments.studyfile.campaign import Response
+from experiments.studyfile.campaign import TARGET_SCENE, Response
 from experiments.studyfile.mechanism_factor import MechanismFactor
 from experiments.studyfile.observables import ANGLE, View, observables_of
 from imaging import PictureError
@@ -79,8 +79,12 @@ class AskedRun:
     results: tuple[Result, ...]
 
 
-def typed_cases(study: Study, table: pd.DataFrame, folder: Path, title: str, store: Store) -> pd.DataFrame:
+def typed_cases(
+    study: Study, table: pd.DataFrame, folder: Path, title: str, store: Store, asked_for: Sequence[Response]
+) -> pd.DataFrame:
     """Return a table of cases with the results that a person typed in; `run_cases` with a person as solver.
+
+    The sheets ask for some responses, or for those of the study.
 
     Raises
     ------
@@ -92,8 +96,10 @@ def typed_cases(study: Study, table: pd.DataFrame, folder: Path, title: str, sto
     """
     cases, refused = build_cases(study, table)
     keys = [store.key(case)[:KEY] if case else "" for case in cases]
-    asked = [_asked(study, key, row) for key, row in zip(keys, table.to_dict("records"), strict=True) if key]
-    every = tuple(_result_of(study, each) for each in study.target.responses)
+    wanted = [(each.scene, _result_of(study, each)) for each in asked_for or study.target.responses]
+    rows = zip(keys, table.to_dict("records"), strict=True)
+    asked = [_asked(study, key, row, wanted) for key, row in rows if key]
+    every = tuple(result for _, result in wanted)
     first = next((case for case in cases if case), None)
     filled = _Sheets(study, folder, title, every).take(asked, first)
     known = {each.key: _result(filled[each.key], each.results, study.measurement.fit) for each in asked}
@@ -178,11 +184,12 @@ class _Sheets:
         return filled
 
 
-def _asked(study: Study, key: str, row: Mapping[str, Any]) -> AskedRun:
-    """Ask for a case of a campaign: the responses of its test."""
-    places = (row["stage"], row["scene"], row["run"], row["replicate"], row["seed"])
+def _asked(study: Study, key: str, row: Mapping[str, Any], wanted: Sequence[tuple[str, Result]]) -> AskedRun:
+    """Ask for a case of a campaign, or of a bridge: the results of its test."""
+    scene = row.get("scene", TARGET_SCENE)
+    places = (row["stage"], scene, row["run"], row.get("replicate", 1), row["seed"])
     settings = {_head(factor): float(row[factor.name]) for factor in study.factors}
-    results = tuple(_result_of(study, each) for each in study.target.responses if each.scene == row["scene"])
+    results = tuple(result for place, result in wanted if place == scene)
     return AskedRun(key, dict(zip(PLACES, places, strict=True)), settings, results)
 
 

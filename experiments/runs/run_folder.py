@@ -7,7 +7,7 @@ import logging
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +33,7 @@ from experiments.journal.journal import Journal
 from experiments.runs.choices import Prepared
 from experiments.runs.request import Watch
 from experiments.studyfile import Study
+from experiments.studyfile.campaign import Response
 from experiments.studyfile.manifest import MANIFEST, write_manifest
 
 WALL_TIMES_FILE = "wall_times.csv"
@@ -105,13 +106,16 @@ class Run:
         if saved or kept() > before:
             save(time.perf_counter() - started)
 
-    def run_cases(self, table: pd.DataFrame, title: str) -> pd.DataFrame:
-        """Simulate the cases of a table that are not stored yet, as one batch, and measure all of them."""
+    def run_cases(self, table: pd.DataFrame, title: str, asked_for: Sequence[Response] = ()) -> pd.DataFrame:
+        """Simulate the cases of a table that are not stored yet, as one batch, and measure all of them.
+
+        A person is asked for some responses, or for those of the study.
+        """
         if self.is_by_hand:
             # few studies are; what reads their sheets takes a second to load
             from experiments.runs.by_hand import typed_cases
 
-            return typed_cases(self.study, table, self.folder, title, self.store)
+            return typed_cases(self.study, table, self.folder, title, self.store, asked_for)
         with self.batch(title, lambda: len(self.store)) as progress:
             more = (self.workers, progress, self.journal, self.measured)
             return run_cases(self.study, table, self.store, *more)

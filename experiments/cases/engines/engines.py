@@ -43,7 +43,8 @@ class _Person:
 
     def __call__(self, cases: Sequence[Case], *others: Any, **options: Any) -> list[CaseResult]:
         raise InputError(
-            "engine.by", "a person simulates this study's cases; only calibrate and discover wait for them"
+            "engine.by",
+            "a person simulates this study's cases; only calibrate, plan, bridge and discover wait for them",
         )
 
 

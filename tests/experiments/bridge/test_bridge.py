@@ -19,6 +19,7 @@ from experiments.bridge.result import BridgeOutcome
 from experiments.bridge.source import Source, read_source
 from experiments.cases import engine_of
 from experiments.cases.engines import engines
+from experiments.io.units import Quantity
 from experiments.studyfile import load_card, load_study
 
 CONES = Path(__file__).parents[1] / "cases" / "engines" / "cone_program.py"
@@ -86,6 +87,26 @@ def test_a_card_is_corrected_for_another_solver_and_verified_there(card: Path, t
     before = log.read_text()
     assert dem_warp("bridge", *words, "--resume")[0] == 0
     assert log.read_text() == before, "a bridge that goes on repeats no run"
+
+
+def test_a_card_is_corrected_by_heaps_that_a_person_types_in(card: Path, tmp_path: Path) -> None:
+    """The person's program stands at 12 + 33 E degrees: 1.5 below the card's cones where those have 30."""
+    out, rng = tmp_path / "out", np.random.default_rng(1)
+    words = ("bridge", card, "--engine", "hand", "--out", out, "--runs", 8, "--fresh", 3)
+    code, _, said = dem_warp(*words)
+    for _ in range(4):
+        assert code == 0, said
+        if (out / "runs.csv").is_file():
+            break
+        sheet = max((out / "by-hand").glob("*.csv"))
+        runs = pd.read_csv(sheet, comment="#")
+        runs["angle [deg]"] = 12.0 + 33.0 * runs["E [1]"] + rng.normal(0.0, 0.1, len(runs))
+        runs.to_csv(sheet, index=False)
+        code, _, said = dem_warp(*words, "--resume")
+    corrected = tomllib.loads((out / "material.toml").read_text(encoding="utf-8"))
+    # Five standard errors of a shift by eight runs.
+    assert Quantity.parse(corrected["bridge"]["shift"]).number == pytest.approx(-1.5, abs=0.3)
+    assert corrected["bridge"]["engine"] == "a program by hand"
 
 
 def test_the_card_holds_the_surface_that_was_fitted(card: Path) -> None:

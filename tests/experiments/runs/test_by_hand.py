@@ -257,4 +257,4 @@ def answer(sheet: Path, person: EmulatedSimulator) -> None:
 def test_only_campaigns_and_searches_wait_for_a_person(study: Path) -> None:
     code, _, said = dem_warp("heap", study, "--scale", "bench", "--engine", "hand", "--out", "one")
     assert code == 2
-    assert "only calibrate and discover wait" in said
+    assert "only calibrate, plan, bridge and discover wait" in said
