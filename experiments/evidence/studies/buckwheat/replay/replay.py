@@ -148,9 +148,10 @@ class Replay:
         low, high = published_noise()
         found = self.agreement(stages, low)
         row: dict[str, float] = {"runs": found.runs}
-        for name in ("rmse", "rmse_without_own_noise", "rmse_without_noise", "bias", "slope", "spearman"):
+        for name in ("rmse", "rmse_without_noise", "bias", "slope", "spearman"):
             estimate = getattr(found, name)
             row |= {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
+        row["rmse_without_own_noise"] = self.agreement(stages, 0.0).rmse_without_noise.value
         row["ceiling"] = found.spearman_ceiling.value
         row["ceiling_noisier"] = self.agreement(stages, high).spearman_ceiling.value
         return row
