@@ -13,16 +13,19 @@ from matplotlib.ticker import MaxNLocator
 
 from doe.arguments import checked_kind, checked_number
 from doe.design.design import checked_setting
+from doe.errors import DesignError
 from doe.plots.palette import BLUE, MUTED, VERMILION
 from doe.plots.plot_data import normal_points, surface_grid
 from doe.plots.style import WIDTH, canvas, key, plain
+from doe.response.analysis.formula import LinearFit
 from doe.response.region import Region
 from doe.response.response_surface import Surface
 
 
-def residual_plots(surface: Surface, axes: tuple[Axes, Axes] | None = None) -> Figure:
+def residual_plots(surface: Surface | LinearFit, axes: tuple[Axes, Axes] | None = None) -> Figure:
     """Draw the studentized residuals: normal plot, and against the fitted response (two axes)."""
-    checked_kind("surface", surface, Surface)
+    if not isinstance(surface, Surface | LinearFit):
+        raise DesignError(f"surface must be a Surface or LinearFit, got {surface!r}")
     residuals = surface.studentized_residuals.dropna()
     points = normal_points(residuals)
     if axes is None:

@@ -1,5 +1,6 @@
 """Linear models beyond polynomials of numbers: free formulas, categories, mixtures."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -36,18 +37,29 @@ class LinearFit:
     @cached_property
     def coefficient_table(self) -> pd.DataFrame:
         """Estimate, se, t, p and vif by coefficient."""
-        return coefficient_table(self.fit)
+        return coefficient_table(self.fit).rename(index=_unquoted)
 
     @cached_property
     def robust_table(self) -> pd.DataFrame:
         """The same with robust standard errors (HC3)."""
-        return coefficient_table(self.fit, robust=True)
+        return coefficient_table(self.fit, robust=True).rename(index=_unquoted)
+
+    @property
+    def fitted(self) -> pd.Series:
+        """Fitted response by observation."""
+        return self.fit.fittedvalues
+
+    @cached_property
+    def studentized_residuals(self) -> pd.Series:
+        """Residuals over their standard errors (internally studentized)."""
+        return pd.Series(self.fit.get_influence().resid_studentized_internal, index=self.table.index)
 
     @cached_property
     def anova(self) -> pd.DataFrame:
         """Partial sums of squares (type II) by term: df, sum_sq, mean_sq, F, p."""
         table = anova_lm(self.fit, typ=2)
         table = table.rename(columns={"PR(>F)": "p"}).rename(index={"Residual": "residual"})
+        table = table.rename(index=_unquoted)
         table["mean_sq"] = table["sum_sq"] / table["df"]
         return table[["df", "sum_sq", "mean_sq", "F", "p"]].rename_axis("source")
 
@@ -80,6 +92,11 @@ class LinearFit:
 
     def __repr__(self) -> str:
         return f"LinearFit {self.formula!r}: {len(self.table)} observations, R2 {self.fit.rsquared:.4f}"
+
+
+def _unquoted(term: str) -> str:
+    """Return a term without the quotation of names in a formula, e.g. ``a:b`` of ``Q('a'):Q('b')``."""
+    return re.sub(r"Q\((['\"])(.*?)\1\)", r"\2", term)
 
 
 def fit_formula(design: Design, response: ArrayLike, formula: str, *, coded: bool = True) -> LinearFit:

@@ -305,6 +305,7 @@ def _linear_answer(linear: LinearFit, name: str) -> Answer:
     answer.tables["coefficients"] = "Coefficients.", linear.coefficient_table
     answer.add("anova", "Analysis of variance.", lambda: linear.anova)
     answer.add("robust", "Coefficients with robust standard errors.", lambda: linear.robust_table)
+    answer.draw("residuals", "Residuals.", lambda: plots.residual_plots(linear))
     return answer
 
 

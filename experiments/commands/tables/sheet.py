@@ -84,7 +84,7 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     given = {text.partition("=")[0].strip(): text.partition("=")[2].strip() for text in columns.factors}
     taken = {block, run, *responses, *dummies}
     before = frame.columns[: min(map(list(frame.columns).index, responses))]
-    rest = [name for name in before if name not in taken and name.lower() not in ORDER]
+    rest = [name for name in before if name not in taken and name.lower() not in (*RUN, *ORDER)]
     names = [_known(path, frame, name) for name in given] or rest
     if not names:
         raise InputError(str(path), "has no column left for a factor", ", ".join(frame.columns))
@@ -114,7 +114,7 @@ def read_mixture(path: Path, responses: Sequence[str]) -> tuple[Mixture, pd.Seri
     name = _known(path, frame, responses[0]) if responses else str(frame.columns[-1])
     run = _one(path, frame, None, RUN)
     frame.index = _labels(path, frame, run)
-    names = [each for each in frame.columns if each not in (name, run) and each.lower() not in ORDER]
+    names = [each for each in frame.columns if each not in (name, run) and each.lower() not in (*RUN, *ORDER)]
     shares = pd.DataFrame({each: _numbers(frame, each, places) for each in names})
     return Mixture(shares, dict.fromkeys(names, 0.0)), _numbers(frame, name, places)
 

@@ -77,6 +77,7 @@ def test_every_kind_of_design_becomes_a_table_that_a_fit_reads(kind: str) -> Non
     model = "linear" if kind in MIXTURES else "first-order"
     tables = answered("fit", filled(Path("made/tables/runs.csv")), "--model", model, *words)
     assert len(tables["coefficients"]) >= 3
+    assert not tables["coefficients"].index.str.contains("Q(", regex=False).any()
     assert Path("made/report.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
 
 
@@ -168,11 +169,11 @@ def test_the_optimum_of_a_known_bowl() -> None:
 
 def test_columns_of_other_programs_are_not_factors() -> None:
     """Minitab's and Design-Expert's columns of order, decimal commas, an empty response."""
-    rows = ["StdOrder;RunOrder;A (mm);B;angle"]
-    rows += [f"{i};{9 - i};{a},5;{b};{10 + a + 2 * b + 0.1 * (i % 3)}" for i, (a, b) in enumerate(
+    rows = ["Std;Run;Space Type;A (mm);B;angle"]
+    rows += [f"{i};{9 - i};Factorial;{a},5;{b};{10 + a + 2 * b + 0.1 * (i % 3)}" for i, (a, b) in enumerate(
         [(1, 0), (2, 0), (1, 1), (2, 1), (1, 0), (2, 1)], start=1
     )]  # fmt: skip
-    Path("runs.csv").write_text("\n".join([*rows, "7;1;1,5;1;"]) + "\n", encoding="utf-8")
+    Path("runs.csv").write_text("\n".join([*rows, "7;1;Center;1,5;1;"]) + "\n", encoding="utf-8")
     tables = answered("fit", "runs.csv", "--model", "first-order", "--at", "A=1.5,B=0.5")
     assert list(tables["coefficients"].index) == ["intercept", "A", "B"]
     # Half of the differences 1 and 2, with scatter of .1.
