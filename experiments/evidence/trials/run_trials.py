@@ -1,4 +1,4 @@
-"""Analyse the trials: all of them in both views in step, the cases of a round in one batch.
+"""Analyse the trials: all of them in step, the cases of a round in one batch.
 
     python -m experiments.evidence.trials.run_trials out/trials --part alone --device cuda --seconds 480
 
@@ -34,7 +34,7 @@ from experiments.evidence.trials.analyses import (
     read_data,
 )
 from experiments.evidence.trials.declaration import read_declaration
-from experiments.evidence.trials.findings import PHOTOGRAPHS, VIEWS, read_findings
+from experiments.evidence.trials.findings import VIEWS, read_findings
 from experiments.evidence.trials.generate_trials import STUDY, bank_beside
 from experiments.evidence.trials.trials_folder import Folder, noted_run
 from experiments.evidence.trials.truth import Sealed, read_sealed
@@ -90,18 +90,11 @@ def run_trials(
             print(f"{ended}, {turn.running} want {turn.cases} cases", flush=True)
 
 
-def chosen(trials: Sequence[Sealed], part: str | None = None, every: int = 1) -> list[Sealed]:
-    """Pick the trials of a part, None for all, and of each part every n-th, by their numbers."""
-    picked = [trial for trial in trials if part in (None, trial.part)]
-    return [trial for trial in picked if int(trial.trial.rpartition("-")[2]) % every == 0]
-
-
 def main(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
     bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
-    every: Annotated[int, typer.Option(help="Take every n-th trial, by their numbers.", min=1)] = 1,
-    view: Annotated[str | None, typer.Option(help="Left out: the plan's, and photographs.")] = None,
+    view: Annotated[str | None, typer.Option(help="Left out: the plan's.")] = None,
     device: Annotated[str | None, typer.Option(help="cpu, cuda, or several GPUs, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
     seconds: Annotated[float, typer.Option(help="Begin no batch after this time.")] = math.inf,
@@ -111,9 +104,9 @@ def main(
         if view not in (None, *VIEWS):
             raise InputError("--view", f"must be one of {', '.join(VIEWS)}", view)
         place = Folder(folder)
-        views = (read_declaration(place.declared).plan.view, PHOTOGRAPHS) if view is None else (view,)
-        sealed = chosen(read_sealed(place.sealed), part, every)
+        views = (view or read_declaration(place.declared).plan.view,)
         # heaps may be made in chunks: what has none yet waits
+        sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
         trials = [trial for trial in sealed if place.measured(trial.trial).exists()]
         try:
             run_trials(place, trials, views, bank, device, workers, seconds)

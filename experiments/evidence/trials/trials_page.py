@@ -1,6 +1,5 @@
 """The record of the trials: tables and one page, written from its own files."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ import pandas as pd
 
 from experiments.evidence.record_page import markdown_table, write_page
 from experiments.evidence.trials.declaration import Declaration, read_declaration
-from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS, read_findings
+from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, read_findings
 from experiments.evidence.trials.score import (
     Aim,
     aims,
@@ -36,13 +35,7 @@ from experiments.evidence.trials.truths import STRONG
 TITLES = {
     EVERYTHING: "With every observable",
     OUTLINED: "With every observable, and the outlines of the photographs",
-    PHOTOGRAPHS: "With photographs only",
 }
-
-_UNAIMED = {
-    PHOTOGRAPHS: "No aims were set for photographs, which show less; gamma80 is that of every observable."
-}
-"""Views that have figures only, and why."""
 
 _VERDICTS = {True: "pass", False: "**FAIL**", None: "too few"}
 
@@ -166,11 +159,15 @@ def _declared(declared: Declaration) -> str:
 
 
 def _view(record: Record, view: str, heading: str) -> list[str]:
-    rows, found = record.in_view(view), record.aims(view)
+    rows = record.in_view(view)
     verdict = "verdict" if len(rows) == record.sealed else "verdict so far"
+    table = [
+        {"question": aim.question, "wanted": aim.wanted, "found": aim.found, verdict: _VERDICTS[aim.passed]}
+        for aim in record.aims(view)
+    ]
     parts = [
-        f"{heading} {_UNAIMED.get(view, '')}",
-        _figures(found) if view in _UNAIMED else _aims(found, verdict),
+        heading,
+        markdown_table(pd.DataFrame(table)),
         "### Strong effects, by mechanism",
         markdown_table(by_mechanism(rows).reset_index()),
     ]
@@ -182,15 +179,3 @@ def _view(record: Record, view: str, heading: str) -> list[str]:
             f"effects of it with an area under the curve of {area}."
         )
     return parts
-
-
-def _aims(found: Sequence[Aim], verdict: str = "verdict") -> str:
-    rows = [
-        {"question": aim.question, "wanted": aim.wanted, "found": aim.found, verdict: _VERDICTS[aim.passed]}
-        for aim in found
-    ]
-    return markdown_table(pd.DataFrame(rows))
-
-
-def _figures(found: Sequence[Aim]) -> str:
-    return markdown_table(pd.DataFrame([{"question": aim.question, "found": aim.found} for aim in found]))

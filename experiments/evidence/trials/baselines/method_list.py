@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from experiments.evidence.trials.baselines.methods.bayes_factors import BayesFactors
 from experiments.evidence.trials.baselines.methods.bic import Bic
 from experiments.evidence.trials.baselines.methods.boosting import Boosting
-from experiments.evidence.trials.baselines.methods.discrepancy import Discrepancy
 from experiments.evidence.trials.baselines.methods.inference import Sbi, is_installed
 from experiments.evidence.trials.baselines.methods.lisdd import Lisdd
 from experiments.evidence.trials.baselines.methods.search_method import Search, Simulator
@@ -23,7 +22,6 @@ def methods(simulator: Simulator | None) -> dict[str, Method]:
         Bic(),
         Lisdd(),
         Boosting(),
-        Discrepancy(),
         Sbi(),
     ]
     if simulator is not None:

@@ -1,9 +1,8 @@
-"""Other codes as programs that make the heaps of a trial."""
+"""LIGGGHTS as the program that makes the heaps of a trial."""
 
 import hashlib
 import shutil
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -33,25 +32,17 @@ REPORTED = tuple(each.name for each in OBSERVABLES if each.name not in PHOTOGRAP
 INPUT = "lift.in"
 
 
-@dataclass(frozen=True)
-class OtherCode:
-    """A code that runs a trial's test from an input of its own."""
+class Liggghts:
+    """The code that runs a trial's test from an input of its own."""
 
-    name: str
-    """Name of the code."""
-    program: str
-    files: Callable[[Bench], Mapping[str, str]]
-    """Files of the input of a case."""
+    name = "LIGGGHTS"
+    program = "liggghts"
+    observables = REPORTED
 
     @property
     def identity(self) -> dict[str, Any]:
         """Name of the code, and what the sources mean that write its inputs and read its film."""
         return {"code": self.name, "sources": _sources()}
-
-    @property
-    def observables(self) -> tuple[str, ...]:
-        """Observables of the test that a film and a balance tell."""
-        return REPORTED
 
     def answers(self, case: Case) -> tuple[str, ...]:
         """Name the film and the balance."""
@@ -60,11 +51,11 @@ class OtherCode:
     def check(self, case: Case) -> None:
         """Raise ValueError where the code is not there, or cannot have a case."""
         self._located()
-        self.files(Bench(case))
+        liggghts_files(Bench(case))
 
     def write(self, case: Case, folder: Path) -> Sequence[str]:
         """Write the input, and return the command that runs it."""
-        for name, text in self.files(Bench(case)).items():
+        for name, text in liggghts_files(Bench(case)).items():
             (folder / name).write_text(text, encoding="utf-8")
         return [self._located(), "-in", INPUT]
 
@@ -85,20 +76,13 @@ class OtherCode:
         raise InputError("the code", f"{self.name} must be installed, its program on the PATH", self.program)
 
 
-CODES = {
-    "liggghts": OtherCode("LIGGGHTS", "liggghts", liggghts_files),
-}
-"""Codes that make a second reality, by name."""
-
 TIME_LIMIT = 1800.0
 """Wall time of a heap [s]: a few seconds of a core, on a machine that may have other things to do."""
 
 
-def engine_for(code: str, workers: int | None = None) -> ProgramEngine:
-    """Engine that runs several heaps of a code at once."""
-    if code not in CODES:
-        raise InputError("--code", f"must be one of {', '.join(CODES)}", code)
-    return ProgramEngine(CODES[code], workers, TIME_LIMIT)
+def liggghts_engine() -> ProgramEngine:
+    """Engine that runs several heaps at once."""
+    return ProgramEngine(Liggghts(), time_limit=TIME_LIMIT)
 
 
 @cache

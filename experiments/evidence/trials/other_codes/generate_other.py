@@ -1,12 +1,11 @@
-"""Draw, seal and measure trials whose heaps another code makes.
+"""Draw, seal and measure trials whose heaps another code, LIGGGHTS, makes.
 
-    python -m experiments.evidence.trials.other_codes.generate_other seal out/liggghts --code liggghts
+    python -m experiments.evidence.trials.other_codes.generate_other seal out/liggghts
     python -m experiments.evidence.trials.other_codes.generate_other measure out/liggghts --seconds 3000
-    python -m experiments.evidence.trials.other_codes.generate_other resume RECORD out/elsewhere
 
 Folders are those of `experiments.evidence.trials.generate_trials`. An equal part of every class of trials is
 measured first, so that a record of some of them is balanced. After ``--seconds`` no trial is begun; the same
-command continues. The last unpacks the measured heaps of a record, whose labels are not there.
+command continues.
 """
 
 import json
@@ -28,26 +27,17 @@ from experiments.discover.search import Search
 from experiments.evidence.trials.declaration import Declaration, read_declaration
 from experiments.evidence.trials.generate_trials import STUDY, bank_beside, seal_trials
 from experiments.evidence.trials.other_codes.code_effects import DECLARED, OUTSIDE
-from experiments.evidence.trials.other_codes.code_process import CODES, engine_for
+from experiments.evidence.trials.other_codes.code_process import Liggghts
 from experiments.evidence.trials.other_codes.code_simulator import OtherCodeSimulator, workshop_study
 from experiments.evidence.trials.other_codes.making import LAWS, MADE
 from experiments.evidence.trials.other_codes.setting import Setting
 from experiments.evidence.trials.run_trials import UNFINISHED
-from experiments.evidence.trials.trial_heaps import CLOGGED, cases_of, unpack_heaps, write_heaps
-from experiments.evidence.trials.trials_folder import DECLARED as DECLARATION
-from experiments.evidence.trials.trials_folder import (
-    FINDINGS,
-    HEAPS,
-    REALITY,
-    RUNS,
-    SEALED,
-    Folder,
-    noted_run,
-)
+from experiments.evidence.trials.trial_heaps import CLOGGED, cases_of, write_heaps
+from experiments.evidence.trials.trials_folder import REALITY, Folder, noted_run
 from experiments.evidence.trials.truth import Kind, Label, read_labels, read_sealed, revealed
 from experiments.evidence.trials.truths import Plan
 from experiments.io.errors import InputError
-from experiments.io.files import copy_file, write_text
+from experiments.io.files import write_text
 from experiments.io.toml_files import read_toml
 from experiments.studyfile import load_study
 
@@ -62,29 +52,23 @@ MISSING = 0.1
 app = typer.Typer(help="Draw, seal and measure blind trials whose heaps another code makes.")
 
 
-def plan_for(code: str, plan: Plan) -> Plan:
-    """Plan whose mechanisms a code can make: all of them, where it names none."""
-    known = MADE[code]
-    if strange := sorted(set(plan.mechanisms) - set(known)):
-        raise InputError("Plan.mechanisms", f"{code} makes only {', '.join(known)}", strange)
-    return replace(plan, mechanisms=plan.mechanisms or tuple(known))
+def plan_for(plan: Plan) -> Plan:
+    """Plan whose mechanisms LIGGGHTS can make: all of them, where it names none."""
+    if strange := sorted(set(plan.mechanisms) - set(MADE)):
+        raise InputError("Plan.mechanisms", f"liggghts makes only {', '.join(MADE)}", strange)
+    return replace(plan, mechanisms=plan.mechanisms or tuple(MADE))
 
 
-def write_reality(path: Path, code: str) -> None:
+def write_reality(path: Path) -> None:
     """Write down which code makes the heaps, and how it makes each effect."""
     reality = {
-        "code": code,
-        "name": CODES[code].name,
-        "laws": LAWS[code],
-        "library": dict(MADE[code]),
+        "code": Liggghts.program,
+        "name": Liggghts.name,
+        "laws": LAWS,
+        "library": dict(MADE),
         "outside": {name: each.sentence for name, each in OUTSIDE.items()},
     }
     write_text(path, json.dumps(reality, indent=1) + "\n")
-
-
-def code_of(folder: Folder) -> str:
-    """Name of the code that makes the heaps of a folder."""
-    return str(json.loads((folder.record / REALITY).read_text(encoding="utf-8"))["code"])
 
 
 def in_turn(labels: Sequence[Label]) -> list[Label]:
@@ -111,7 +95,7 @@ def measure_in_time(
 
     A trial of which too many heaps fail is reported and left, to be tried again.
     """
-    code, study = code_of(folder), workshop_study(declaration.scale)
+    study = workshop_study(declaration.scale)
     conditions = [condition.name for condition in study.conditions]
     table = OutcomeTable(folder.hidden / "outcomes.sqlite")
     waiting = [label for label in in_turn(labels) if not folder.measured(label.trial).exists()]
@@ -119,10 +103,10 @@ def measure_in_time(
     for done, label in enumerate(waiting):
         if time.monotonic() > deadline:
             return len(waiting) - done + refused
-        setting = Setting.drawn(code, label.seed)
+        setting = Setting.drawn(label.seed)
         with (
-            OtherCodeSimulator(study, code, setting, table, workers) as simulator,
-            noted_run(folder, f"heaps, {CODES[code].name}", "cpu", table),
+            OtherCodeSimulator(study, setting, table, workers) as simulator,
+            noted_run(folder, f"heaps, {Liggghts.name}", "cpu", table),
         ):
             wave = cases_of(label, conditions, declaration.plan.replicates)
             outcomes = simulator(wave)
@@ -144,7 +128,6 @@ def measure_in_time(
 @app.command()
 def seal(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
-    code: Annotated[str, typer.Option(help="Code that makes the heaps.")] = "liggghts",
     bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     scale: Annotated[str, typer.Option(help="Scale of the trial study.")] = SCALE,
     plan: Annotated[Path | None, typer.Option(help="TOML file with numbers of trials.")] = None,
@@ -152,13 +135,12 @@ def seal(
 ) -> None:
     """Draw the truths; write their seals, to be published, and their labels, to be kept."""
     with clear_errors():
-        engine_for(code)
-        numbers = plan_for(code, Plan(**read_toml(plan)[1]) if plan else PLAN)
+        numbers = plan_for(Plan(**read_toml(plan)[1]) if plan else PLAN)
         place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
         waves = search.read_bank(bank or bank_beside(scale))
         drawn = secrets.randbits(63) if seed is None else seed
         seal_trials(place, search, waves, numbers, drawn, DECLARED)
-        write_reality(place.record / REALITY, code)
+        write_reality(place.record / REALITY)
         print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
 
 
@@ -182,21 +164,6 @@ def measure(
     if left:
         print(f"{left} trials have not been measured: run it again")
         raise typer.Exit(UNFINISHED)
-
-
-@app.command()
-def resume(
-    record: Annotated[Path, typer.Argument(help="Record of a second reality.")],
-    folder: Annotated[Path, typer.Argument(help="New folder of its trials.")],
-) -> None:
-    """Begin a folder with what a record has: seals, findings and measured heaps, no hidden label."""
-    with clear_errors():
-        place = Folder(folder)
-        if place.sealed.exists():
-            raise InputError(str(folder), "must be a folder without trials", "sealed trials")
-        for name in (DECLARATION, SEALED, FINDINGS, RUNS, REALITY):
-            copy_file(record / name, place.record / name)
-        print(f"{unpack_heaps(record / HEAPS, place)} trials are measured: {place.data}")
 
 
 if __name__ == "__main__":

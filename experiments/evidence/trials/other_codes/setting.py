@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from dem_warp import PRESETS, Case, ContactLaws, Interaction
+from dem_warp import PRESETS, Case, Interaction
 from dem_warp.laws.conventions import Rolling
 from experiments.discover.mechanism_files import LONG_LEVER
 from experiments.evidence.trials.other_codes.odd_lift import odd
@@ -20,15 +19,8 @@ DIRECTIONS = 4096
 _STREAM = 2
 """Stream of random numbers of a trial's seed; 1 is that of its camera."""
 
-LAWS: Mapping[str, ContactLaws] = {
-    "liggghts": PRESETS["liggghts"],
-}
-"""Laws of each code, but for rolling."""
-
-ROLLING: Mapping[str, tuple[Rolling, ...]] = {
-    "liggghts": ("cdt", "epsd2"),
-}
-"""Resistances to rolling of each code."""
+ROLLING: tuple[Rolling, ...] = ("cdt", "epsd2")
+"""Resistances to rolling of LIGGGHTS."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +39,7 @@ class Setting:
     """Resistance to rolling, where there is one."""
 
     @classmethod
-    def drawn(cls, code: str, seed: int) -> Setting:
+    def drawn(cls, seed: int) -> Setting:
         """Draw the setting of a trial from its seed."""
         rng = np.random.default_rng([seed, _STREAM])
         return cls(
@@ -55,11 +47,11 @@ class Setting:
             rain_rate=float(rng.uniform(500.0, 1000.0)),
             tube_sides=int(rng.integers(40, 97)),
             look_time=float(rng.uniform(2.5e-3, 5e-3)),
-            rolling=ROLLING[code][rng.integers(len(ROLLING[code]))],
+            rolling=ROLLING[rng.integers(len(ROLLING))],
         )
 
-    def of(self, case: Case[Any], code: str) -> Case[Any]:
-        """Take a case to the other workshop, which has a code."""
+    def of(self, case: Case[Any]) -> Case[Any]:
+        """Take a case to the other workshop."""
         scene = odd(
             replace(case.scene, rain_rate=min(self.rain_rate, case.scene.rain_rate)),
             tube_sides=self.tube_sides,
@@ -73,7 +65,7 @@ class Setting:
             grain_grain=_with_lever(case.grain_grain, among),
             grain_wall=_with_lever(case.grain_wall, wall),
             numerics=replace(case.numerics, time_step_fraction=fraction),
-            laws=replace(LAWS[code], rolling=self.rolling),
+            laws=replace(PRESETS["liggghts"], rolling=self.rolling),
         )
 
 

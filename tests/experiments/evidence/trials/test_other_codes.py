@@ -21,7 +21,6 @@ from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.evidence.trials.generate_trials import STUDY
 from experiments.evidence.trials.other_codes import dump_reading
 from experiments.evidence.trials.other_codes.code_effects import DECLARED, OUTSIDE
-from experiments.evidence.trials.other_codes.code_process import engine_for
 from experiments.evidence.trials.other_codes.code_simulator import OtherCodeSimulator
 from experiments.evidence.trials.other_codes.code_surfaces import Bench
 from experiments.evidence.trials.other_codes.generate_other import PLAN, in_turn, plan_for
@@ -44,7 +43,7 @@ G = 9.81
 def case_of() -> Case:
     """Return a test of few grains, in the setting of LIGGGHTS's workshop."""
     case = load_study(STUDY, "bench", SMALL).case(THETA, seed=3)
-    return SETTING.of(case, "liggghts")
+    return SETTING.of(case)
 
 
 SHAPE = case_of().grains.mixture.shapes[0]
@@ -58,7 +57,7 @@ def test_rolling_friction_is_friction_to_other_codes_with_the_lever_that_the_stu
     for laws in ("edem", "relative"):
         case = load_study(STUDY, "bench", study | {"solver": {"laws": laws}}).case(THETA, seed=3)
         case = replace(case, grains=GrainPopulation(sphere, case.grain_material))
-        theirs = SETTING.of(case, "liggghts")
+        theirs = SETTING.of(case)
         friction[laws] = [theirs.grain_grain.rolling_friction, theirs.grain_wall.rolling_friction]
     assert friction["edem"] == pytest.approx([0.2, 0.1], rel=1e-12)
     assert friction["relative"] == [0.1, 0.1]
@@ -229,26 +228,24 @@ def test_a_conical_tube_is_right_at_half_its_height() -> None:
 
 
 def test_a_setting_is_the_trials_own_and_always_the_same() -> None:
-    settings = {Setting.drawn("liggghts", seed) for seed in range(30)}
+    settings = {Setting.drawn(seed) for seed in range(30)}
     assert len(settings) == 30
     assert {setting.rolling for setting in settings} == {"cdt", "epsd2"}
-    assert Setting.drawn("liggghts", 7) == Setting.drawn("liggghts", 7)
-    ours, theirs = load_study(STUDY, "bench").case(THETA, 1), Setting.drawn("liggghts", 7)
-    case = theirs.of(ours, "liggghts")
+    assert Setting.drawn(7) == Setting.drawn(7)
+    ours, theirs = load_study(STUDY, "bench").case(THETA, 1), Setting.drawn(7)
+    case = theirs.of(ours)
     assert case.time_step == pytest.approx(theirs.step_share * ours.time_step)
     assert case.laws.sliding == "spring_free"
 
 
 def test_the_plan_holds_at_least_120_trials_of_what_the_code_can_make() -> None:
-    plan = plan_for("liggghts", PLAN)
-    assert plan.mechanisms == tuple(MADE["liggghts"])
+    plan = plan_for(PLAN)
+    assert plan.mechanisms == tuple(MADE)
     singles = plan.strong * len(plan.mechanisms)
     assert (plan.nulls, singles, plan.pairs) == (40, 48, 12)
     assert plan.nulls + singles + plan.pairs + plan.outside * len(OUTSIDE) >= 120
     with pytest.raises(InputError, match="liggghts makes only"):
-        plan_for("liggghts", Plan(mechanisms=("air_drag",)))
-    with pytest.raises(InputError, match="must be one of liggghts"):
-        engine_for("edem")
+        plan_for(Plan(mechanisms=("air_drag",)))
 
 
 def test_trials_are_measured_evenly_over_their_classes() -> None:
@@ -278,7 +275,7 @@ def observed(folder: Path, *sizes: Sizes, seed: int = 12) -> list[dict[str, floa
     """Observables of small tests that a code runs, each with some effects; or why one has no heap."""
     study, table = load_study(STUDY, "bench", SMALL), OutcomeTable(folder / "outcomes.sqlite")
     points = [Point(tuple(THETA.values()), own, "base", seed) for own in sizes]
-    with OtherCodeSimulator(study, "liggghts", SETTING, table, OwnWorkers("cpu", 1)) as simulator:
+    with OtherCodeSimulator(study, SETTING, table, OwnWorkers("cpu", 1)) as simulator:
         outcomes = simulator(points)
     rows = [dict(zip(simulator.observables, row, strict=True)) for row in outcomes.values]
     return [reason or row for row, reason in zip(rows, outcomes.reasons, strict=True)]
@@ -302,7 +299,7 @@ def test_a_code_makes_a_heap_that_our_functions_read(tmp_path: Path) -> None:
 
 @pytest.mark.program("liggghts")
 def test_a_code_makes_every_effect(tmp_path: Path) -> None:
-    left = {name: _largest(name) for name in MADE["liggghts"]}
+    left = {name: _largest(name) for name in MADE}
     left |= {name: effect.maximum for name, effect in OUTSIDE.items()}
     # so few grains may leave no heap that can be read: another filling decides then
     for seed in (12, 13, 14, 15):

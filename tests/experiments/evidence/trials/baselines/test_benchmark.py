@@ -97,13 +97,13 @@ def test_a_round_has_every_kind_and_sizes_within_the_ranges() -> None:
 
 
 def test_the_command_goes_on_where_it_stopped(tmp_path: Path) -> None:
-    command = [str(tmp_path), "--methods", "discrepancy", "--count"]
+    command = [str(tmp_path), "--methods", "BIC", "--count"]
     app = run_methods.typer.Typer()
     app.command()(run_methods.main)
     for count in ("1", "2"):
         done = CliRunner().invoke(app, [*command, count])
         assert done.exit_code == 0, done.output
-    answers = read_answers(file_of(tmp_path, "discrepancy"))
+    answers = read_answers(file_of(tmp_path, "BIC"))
     assert list(answers["trial"]) == ["trial-001", "trial-002"]
     refused = CliRunner().invoke(app, [str(tmp_path), "--methods", "guessing"])
     assert refused.exit_code == 2

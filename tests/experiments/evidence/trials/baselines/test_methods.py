@@ -1,19 +1,18 @@
 """Each method on worlds whose truth is known: closed forms, sparse truths, a strong effect and none."""
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import stats
 from scipy.special import logsumexp
 from synthetic_world import CONDITIONS, OBSERVABLES, SETTINGS, emulator, measure
 
 from doe.discrepancy.fitting.model_fit import weigh
 from doe.errors import RuleError
 from experiments.evidence.trials.baselines.method_list import ALONE, installed, methods
-from experiments.evidence.trials.baselines.methods import discrepancy, inference, lisdd
+from experiments.evidence.trials.baselines.methods import inference, lisdd
 from experiments.evidence.trials.baselines.methods.contest import judged, prior_of_one
 from experiments.evidence.trials.baselines.methods.model_evidence import log_evidence, smc
 from experiments.evidence.trials.baselines.protocol import Answer, Problem
@@ -66,42 +65,6 @@ def test_what_the_library_lacks_is_not_named_alone(name: str, foreign: Problem) 
     assert answer.alarm
     assert answer.unknown
     assert answer.named == ()
-
-
-def test_a_discrepancy_is_seen_and_its_score_grows_with_the_effect() -> None:
-    method = methods(None)["discrepancy"]
-    answers = [
-        method(Problem(str(size), KNOWN, measure({"beta": size}, 3), SETTINGS, 4)) for size in (0.0, 0.6, 2.0)
-    ]
-    assert [answer.alarm for answer in answers] == [False, True, True]
-    scores = [answer.score for answer in answers]
-    assert scores == sorted(scores)
-
-
-@dataclass(frozen=True)
-class Line:
-    """Slopes and bounds of a linear model, as `log_evidence` of a discrepancy asks for them."""
-
-    slopes: np.ndarray
-    target: np.ndarray
-
-    def predict(self, x: np.ndarray) -> np.ndarray:
-        return x @ self.slopes.T
-
-    def jacobian(self, x: np.ndarray) -> np.ndarray:
-        return np.repeat(self.slopes[None], len(x), axis=0)
-
-
-def test_the_evidence_of_a_linear_model_is_its_integral_over_the_prior() -> None:
-    rng = np.random.default_rng(1)
-    slopes = rng.standard_normal((5, 2))
-    target = slopes @ [0.4, -0.3] + 0.5 * rng.standard_normal(5)
-    covariance = 0.25 * np.eye(5) + 0.1
-    found = discrepancy.log_evidence(Line(slopes, target), np.array([0.2, 0.1]), covariance)
-    x = np.sqrt(discrepancy.PRIOR_VARIANCE) * rng.standard_normal((200_000, 2))
-    logs = stats.multivariate_normal(np.zeros(5), covariance).logpdf(target - x @ slopes.T)
-    # The mean of these weights has a relative error of some 0.005.
-    assert found == pytest.approx(logsumexp(logs) - np.log(len(x)), abs=0.03)
 
 
 def test_the_bayes_factor_of_a_linear_model_is_the_closed_form() -> None:
