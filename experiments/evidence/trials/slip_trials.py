@@ -18,8 +18,7 @@ import typer
 from doe.discrepancy import Emulator, Measured, Settings, analyse, drive
 from doe.discrepancy.contest.slips import find_slips
 from experiments.evidence.record_page import markdown_table
-from experiments.evidence.trials.baselines.draw import REPLICATES, true_world
-from experiments.evidence.trials.baselines.emulated_world import emulated_heaps
+from experiments.evidence.trials.baselines.emulated_world import REPLICATES, emulated_heaps, true_world
 from experiments.evidence.trials.baselines.methods.search_method import no_runs
 from experiments.studyfile.observables import OBSERVABLES
 

@@ -18,11 +18,12 @@ from doe.discrepancy.contest.gap import find_gap
 from doe.discrepancy.contest.signatures import projector, signatures
 from doe.discrepancy.fitting.model_fit import Fitted, whiten
 from experiments.evidence.accuracy.statistics.coverage import AT_MOST, EXACT, Figure, generator
-from experiments.evidence.trials.baselines.draw import REPLICATES, true_world
 from experiments.evidence.trials.baselines.emulated_world import (
+    REPLICATES,
     EmulatedSimulator,
     emulated_heaps,
     redrawn_bank,
+    true_world,
 )
 from experiments.evidence.trials.baselines.protocol import Problem
 

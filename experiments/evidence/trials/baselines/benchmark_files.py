@@ -6,8 +6,8 @@ by chance.
 
 import json
 import zlib
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -15,10 +15,9 @@ import numpy as np
 
 from doe.discrepancy import Bank, Emulator, Measured, Settings, fit_emulator, load_bank
 from experiments.evidence.trials.baselines.protocol import Problem
-from experiments.evidence.trials.truth import Label, read_labels, write_labels
+from experiments.evidence.trials.truth import Label, read_labels
 from experiments.evidence.trials.truths import Declared
 from experiments.io.errors import InputError
-from experiments.io.files import replacing, write_text
 
 FOLDER = Path(__file__).parent / "benchmark"
 """The released benchmark."""
@@ -71,39 +70,6 @@ class Benchmark:
         known = self.emulators[trial.bank].without(*trial.withheld)
         seed = zlib.crc32(trial.name.encode())
         return Problem(trial.name, known, trial.measured, self.rules[trial.bank], seed)
-
-
-def write_benchmark(folder: Path, benchmark: Benchmark, labels: Sequence[Label]) -> None:
-    """Write banks, trials and rules, and the answers apart."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for number, bank in enumerate(benchmark.banks):
-        bank.save(folder / f"bank-{number}.npz")
-    trials = benchmark.trials
-    conditions = trials[0].measured.conditions
-    with replacing(folder / TRIALS) as temporary:
-        np.savez_compressed(
-            temporary,
-            trial=np.array([one.name for one in trials]),
-            bank=np.array([one.bank for one in trials], dtype=np.int16),
-            withheld=np.array([" ".join(one.withheld) for one in trials]),
-            conditions=np.array(conditions),
-            observables=np.array(trials[0].measured.observables),
-            values=np.array(
-                [[one.measured.values[c] for c in conditions] for one in trials], dtype=np.float32
-            ),
-        )
-    rules = [
-        {"settings": asdict(settings), "library": [_record(effect) for effect in library]}
-        for settings, library in zip(benchmark.rules, benchmark.libraries, strict=True)
-    ]
-    write_text(folder / RULES, json.dumps(rules, indent=1, allow_nan=False) + "\n")
-    write_labels(folder / ANSWERS, labels)
-
-
-def _record(effect: Declared) -> dict[str, object]:
-    """Fields of a declared mechanism; JSON has no infinity, so a size that no data show is null."""
-    detectable = effect.detectable if np.isfinite(effect.detectable) else None
-    return asdict(effect) | {"detectable": detectable}
 
 
 def load_benchmark(folder: Path = FOLDER) -> Benchmark:

@@ -11,8 +11,26 @@ from zlib import crc32
 
 import numpy as np
 
-from doe.discrepancy import Bank, Emulator, Measured, Outcomes, Point, Settings, bank_points, make_bank
+from doe.discrepancy import (
+    Bank,
+    Emulator,
+    Measured,
+    Outcomes,
+    Point,
+    Settings,
+    bank_points,
+    fit_emulator,
+    make_bank,
+)
+from experiments.discover.search import Search
+from experiments.evidence.trials.generate_trials import STUDY, bank_beside
+from experiments.studyfile import load_study
 
+SCALE = "bench"
+BEND = 0.3
+"""Standard deviation of the part of the truth that no polynomial follows, in those of one run."""
+REPLICATES = 8
+"""Heaps a condition."""
 BEND_LENGTH = 0.7
 """Length over which a bend changes, in half ranges: a polynomial follows the larger part of it."""
 WAVES = 64
@@ -69,6 +87,18 @@ class EmulatedSimulator:
             waves = _waves(point.condition, name, at, self.emulator.observables)
             bent = bent + coded * waves * ~surfaces.additions[name].silent
         return np.asarray(self.bend * np.sqrt(surfaces.noise.variance(np.zeros_like(theta))) * bent)
+
+
+@cache
+def true_world() -> tuple[EmulatedSimulator, Settings]:
+    """Return the simulator that stands for reality, and the rules of its study."""
+    search = Search.of(load_study(STUDY, SCALE))
+    return EmulatedSimulator(fit_emulator(search.read_bank(bank_beside(SCALE))), BEND), search.settings
+
+
+def fresh_runs(points: Sequence[Point]) -> Outcomes:
+    """Observables of points in the true world, as an analysis may ask for them."""
+    return true_world()[0](points)
 
 
 def _waves(condition: str, mechanism: str, at: np.ndarray, observables: tuple[str, ...]) -> np.ndarray:

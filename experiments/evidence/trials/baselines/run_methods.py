@@ -19,7 +19,7 @@ from experiments.commands.console import clear_errors
 from experiments.evidence.trials.baselines import benchmark_files
 from experiments.evidence.trials.baselines.answers_table import add_answer, answered, file_of
 from experiments.evidence.trials.baselines.benchmark_files import load_benchmark
-from experiments.evidence.trials.baselines.draw import fresh_runs
+from experiments.evidence.trials.baselines.emulated_world import fresh_runs
 from experiments.evidence.trials.baselines.measured_problems import measured_problems
 from experiments.evidence.trials.baselines.method_list import installed, methods
 from experiments.evidence.trials.baselines.protocol import Method, Problem

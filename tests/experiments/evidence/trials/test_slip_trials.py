@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.evidence.trials import slip_trials
-from experiments.evidence.trials.baselines.draw import true_world
+from experiments.evidence.trials.baselines.emulated_world import true_world
 from experiments.evidence.trials.slip_trials import KINDS, answer, twin
 
 

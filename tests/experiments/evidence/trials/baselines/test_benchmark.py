@@ -14,14 +14,11 @@ from experiments.evidence.trials.baselines.benchmark_files import (
     Posed,
     load_answers,
     load_benchmark,
-    write_benchmark,
 )
-from experiments.evidence.trials.baselines.draw import round_of
 from experiments.evidence.trials.baselines.method_list import ALONE
 from experiments.evidence.trials.baselines.protocol import Answer
 from experiments.evidence.trials.score import auroc
 from experiments.evidence.trials.truth import Kind, Label, write_labels
-from experiments.evidence.trials.truths import STRONG, Declared
 from experiments.io.errors import InputError
 
 RECORDS = Path(benchmark_files.FOLDER).parents[1] / "record"
@@ -47,20 +44,6 @@ def test_the_release_is_small_and_every_trial_has_its_answer_apart(released: Ben
         assert {trial.measured.values[name].shape for name in trial.measured.conditions} == {shape}  # noqa: PD011
 
 
-def test_a_benchmark_is_read_as_it_was_written(tmp_path: Path, released: Benchmark) -> None:
-    few = Benchmark(released.banks, released.rules, released.libraries, released.trials[:3])
-    write_benchmark(tmp_path, few, list(load_answers().values())[:3])
-    again = load_benchmark(tmp_path)
-    assert again.rules == released.rules
-    assert again.libraries == released.libraries
-    for one, other in zip(few.trials, again.trials, strict=True):
-        assert (one.name, one.bank, one.withheld) == (other.name, other.bank, other.withheld)
-        for name in one.measured.conditions:
-            np.testing.assert_array_equal(one.measured.values[name], other.measured.values[name])  # noqa: PD011
-    np.testing.assert_array_equal(again.banks[1].values, released.banks[1].values)
-    assert load_answers(tmp_path) == dict(list(load_answers().items())[:3])
-
-
 def test_files_of_no_benchmark_are_refused(tmp_path: Path, released: Benchmark) -> None:
     with pytest.raises(InputError, match="must be a file"):
         load_benchmark(tmp_path)
@@ -70,30 +53,6 @@ def test_files_of_no_benchmark_are_refused(tmp_path: Path, released: Benchmark) 
     stray = Posed("t", 7, (), released.trials[0].measured)
     with pytest.raises(InputError, match="numbers of banks"):
         Benchmark(released.banks, released.rules, released.libraries, (stray,))
-
-
-def test_a_round_has_every_kind_and_sizes_within_the_ranges() -> None:
-    library = (
-        Declared("a", 0.0, 1.0, 0.3),
-        Declared("b", 0.0, 1.0, 0.5, kin=("c",)),
-        Declared("c", 0.0, 1.0, 0.5),
-    )
-    drawn = [list(round_of(library, number, np.random.default_rng(number))) for number in range(6)]
-    for hidden in drawn:
-        kinds = [kind for kind, _ in hidden]
-        assert [kinds.count(kind) for kind in (Kind.NULL, Kind.SINGLE, Kind.PAIR, Kind.WITHHELD)] == [
-            4,
-            3,
-            1,
-            2,
-        ]
-        for kind, effects in hidden:
-            assert {effect.name for effect, _ in effects} != {"b", "c"}
-            for effect, multiple in effects:
-                assert 0.5 <= multiple <= effect.strongest
-                assert kind is Kind.SINGLE or multiple >= STRONG
-    sizes = {m for hidden in drawn for kind, effects in hidden if kind is Kind.SINGLE for _, m in effects}
-    assert sizes == {0.5, 1.0, 1.5, 2.0, 3.0}
 
 
 def test_the_command_goes_on_where_it_stopped(tmp_path: Path) -> None:
