@@ -1,4 +1,4 @@
-"""What keeps the search from a name: rules, the right names that each costs, the wrong ones it stops.
+"""Rules that keep the search from a name: the right names that each costs, the wrong ones that it stops.
 
     python -m experiments.evidence.trials.baselines.last_names
     python -m experiments.evidence.trials.baselines.last_names out/record/eighth out/record/ninth
@@ -40,7 +40,7 @@ RULES = {
     "declared not resolvable": f"{CLOSEST}(?:it was declared|by declaration)",
     "several pairs fit": "^no one pair stands out: (.*)",
 }
-"""What a reason begins with, by rule; the group is the best model, or the models of a tie, best first."""
+"""Beginnings of reasons by rule; the group is the best model, or the models of a tie, best first."""
 LIMITS = (4.0, 8.0, 12.0, 16.0)
 """Rises of Q of the held-out conditions, by fresh runs, from which on a name would be withdrawn."""
 

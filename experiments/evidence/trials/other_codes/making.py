@@ -27,4 +27,4 @@ LAWS = (
     "dashpot of a contact that sticks may pass it together, and takes the size of the normal force; ours "
     "holds for their sum, and takes the push"
 )
-"""What its base law has of its own."""
+"""Own ways of its base law."""
