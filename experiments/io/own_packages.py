@@ -27,11 +27,14 @@ def foreign_packages() -> list[tuple[str, Path]]:
 def require_own_packages() -> None:
     """Raise InputError where a package of others has taken the place of one of dem-warp's."""
     for name, path in foreign_packages():
+        again = "pip install --force-reinstall --no-deps . in the clone of dem-warp"
+        if not path.is_file():
+            raise InputError(f"package {name}", f"files are missing in {ROOT / name}", hint=f"Run {again}")
         others = [each for each in packages_distributions().get(name, []) if each != "dem-warp"]
         problem = f"{path} is not dem-warp's" + (f" but of the package {others[0]}" if others else "")
-        remove = f"Uninstall {others[0]}" if others else f"Move or rename {path.parent}"
-        hint = f"{remove}; if it has overwritten files: pip install --force-reinstall --no-deps dem-warp"
-        raise InputError(f"package {name}", problem, hint=hint)
+        place = path.parent if path.name == "__init__.py" else path
+        remove = f"Uninstall {others[0]}" if others else f"Move or rename {place}"
+        raise InputError(f"package {name}", problem, hint=f"{remove}; if it has overwritten files: {again}")
 
 
 def _file_of(name: str) -> Path:

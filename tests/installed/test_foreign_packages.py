@@ -57,12 +57,19 @@ def test_a_package_that_was_installed_over_ours_is_named(
     code, said = _run(tmp_path, site)
     assert code == 2
     assert "is not dem-warp's but of the package classical. Uninstall classical" in said
-    assert "pip install --force-reinstall --no-deps dem-warp" in said
+    assert "pip install --force-reinstall --no-deps . in the clone" in said
+    (site / name / "__init__.py").unlink()  # as pip does when it uninstalls the other package
+    code, said = _run(tmp_path, site)
+    assert code == 2
+    assert f"package {name}: files are missing in" in said
 
 
-def test_a_folder_next_to_a_script_is_named(installed: Installed, tmp_path: Path) -> None:
-    (tmp_path / "doe").mkdir()
-    (tmp_path / "doe" / "__init__.py").write_text("FACTORS = 2\n", encoding="utf-8")
+@pytest.mark.parametrize(("file", "moved"), [("doe/__init__.py", "doe"), ("doe.py", "doe.py")])
+def test_a_module_next_to_a_script_is_named(
+    file: str, moved: str, installed: Installed, tmp_path: Path
+) -> None:
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_text("FACTORS = 2\n", encoding="utf-8")
     (tmp_path / "script.py").write_text("from experiments.api import calibrate\n", encoding="utf-8")
     done = subprocess.run(
         [sys.executable, tmp_path / "script.py"],
@@ -71,5 +78,5 @@ def test_a_folder_next_to_a_script_is_named(installed: Installed, tmp_path: Path
         text=True,
     )
     last = done.stderr.strip().splitlines()[-1]
-    assert f"package doe: {tmp_path / 'doe' / '__init__.py'} is not dem-warp's" in last
+    assert f"package doe: {tmp_path / file} is not dem-warp's. Move or rename {tmp_path / moved};" in last
     assert "cannot import" not in done.stderr
