@@ -36,14 +36,23 @@ def choose_jointly(joint: JointFit, settings: OptimumSettings) -> tuple[dict[str
     return joint.point, rule
 
 
-def ranges_of(region: Region, joint: JointFit | None) -> pd.DataFrame:
+def ranges_of(
+    region: Region, joint: JointFit | None, limits: Mapping[str, tuple[float, float]]
+) -> pd.DataFrame:
     """Return the range of each factor, with the ends at an edge of what was explored.
 
     With several responses that agree it is the interval of the factor by itself, else that of the region.
+    An end at a physical limit is not open: nothing is beyond.
     """
     if joint is not None and region.mask.any():
-        return joint.intervals.drop(columns="value")
-    return region.ranges.join(region.open_ends.add_suffix("_open"))
+        ranges = joint.intervals.drop(columns="value")
+    else:
+        ranges = region.ranges.join(region.open_ends.add_suffix("_open"))
+    for factor in region.factors:
+        for end, limit in zip(("low", "high"), limits[factor.name], strict=True):
+            if abs(ranges.at[factor.name, end] - limit) < 1e-6 * factor.half_range:
+                ranges.loc[factor.name, [end, f"{end}_open"]] = limit, False
+    return ranges
 
 
 def joint_decisions(

@@ -59,7 +59,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     else:
         (point, rule), region = choose_jointly(joint, settings), joint.region()
     prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
-    ranges = ranges_of(region, joint)
+    ranges = ranges_of(region, joint, study.limits)
     unidentified = _unidentified(settings, region, ranges)
     truth = (
         None

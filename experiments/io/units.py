@@ -32,8 +32,9 @@ UNITS: dict[str, dict[str, float]] = {
 
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "µ": "u", "μ": "u", "°": "deg", "−": "-"})
 _POWER = re.compile(r"\b([a-z]*m)(?:\*\*)?([23])\b")
-_COMMA = re.compile(r"[+-]?\d+(?:,\d+)+(?:[eE][+-]?\d+)?(?:\s+\S.*|[^\s\d].*)?")
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?![\d.])")
+_MARKS = re.compile(r"([+-]?\d+(?:[.,]\d+|[\s'’_]\d{3}(?!\d))+)((?:[eE][+-]?\d+)?(?:\s+\S.*|[^\s\d].*)?)")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:([.,\s'’_])\d{3})(?:\1\d{3})*")
+_FLOAT = re.compile(r"[+-]?\d+\.\d+")
 _TEXT = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
 LONGEST = 100
@@ -54,8 +55,8 @@ class Quantity:
             quantity = value
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             quantity = cls(_float(value))
-        elif (text := _spelled(value)) and _COMMA.fullmatch(text):
-            raise ValueError(_comma_problem(text))
+        elif (text := _spelled(value)) and (found := _MARKS.fullmatch(text)) and not _FLOAT.fullmatch(found[1]):
+            raise ValueError(_marks_problem(*found.groups()))
         elif text and (match := _TEXT.fullmatch(text)):
             quantity = cls(float(match[1]), _POWER.sub(r"\1^\2", match[2]))
         else:
@@ -91,12 +92,16 @@ class Quantity:
         return self.number / inverse if math.isclose(inverse * size, 1.0) else self.number * size
 
 
-def _comma_problem(text: str) -> str:
-    """Name both readings of a comma: a decimal one, and a separator of thousands."""
-    readings = [text.replace(",", ".")] if text.count(",") == 1 else []
-    readings += [text.replace(",", "")] if _THOUSANDS.match(text) else []
-    shown = " or ".join(f'"{reading}"' for reading in readings) or "one number"
-    return f"must have no comma, but a decimal point if any: {shown}"
+def _marks_problem(number: str, rest: str) -> str:
+    """Name both readings of a comma or another mark: a decimal one, and a separator of thousands."""
+    head, mark, tail = re.fullmatch(r"(.*)([.,\s'’_])(\d+)", number).groups()
+    whole = re.sub(r"[.,\s'’_]", "", head)
+    decimal = mark in ".," and mark not in head and (head == whole or _THOUSANDS.fullmatch(head))
+    readings = [f"{whole}.{tail}"] if decimal else []
+    readings += [whole + tail] if _THOUSANDS.fullmatch(number) else []
+    shown = " or ".join(f'"{reading}{rest}"' for reading in readings) or "one number"
+    wrong = "comma" if "," in number else f'"{mark}" in a number'
+    return f"must have no {wrong}, but a decimal point if any: {shown}"
 
 
 def _float(value: float) -> float:

@@ -85,7 +85,7 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
         )
     shown: Layout = [
         *("parameter", "symbol", "unit"),
-        *columns(explored="range explored", value="value", compatible="compatible range"),
+        *columns(explored="stated range", value="value", compatible="compatible range"),
     ]
     level = fixed(100.0 * campaign.settings.optimum.confidence, 0)
     caption, note = "Contact parameters, as calibrated.", say("note.paper", level=level)

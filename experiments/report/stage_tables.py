@@ -20,6 +20,7 @@ from experiments.calibrate.results import (
     SurfaceResult,
     failed,
 )
+from experiments.export.sizes import sizes_text
 from experiments.report.kit.numbers import open_end, unit_sign
 from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
@@ -277,8 +278,9 @@ def fixed_table(study: Study, optimum: OptimumResult, case: Case[Any]) -> Table:
     rows = [
         {"what": place.replace(".", ", ").replace("_", " "), "value": str(value), "note": ""}
         for place, value in leaves({key: chosen[key] for key in ENTERED if key in chosen})
-        if place not in varied and not place.endswith("shear_modulus")
+        if place not in varied and not place.endswith("shear_modulus") and not place.startswith("grain.size_")
     ]
+    rows.append({"what": "grain, sizes", "value": sizes_text(case.grains), "note": ""})
     scale = study.numerics.modulus_scale
     for name, modulus in moduli.items():
         note = f"as simulated: divided by {scale:g}; keep it" if name == "grain" and scale != 1.0 else ""

@@ -12,6 +12,7 @@ from analytic_heaps import StandInStudy, settings
 from doe import Factor, Goal, Sample, joint_fit
 from experiments.calibrate import ClimbEnd, Outcome
 from experiments.calibrate.cases import StageEnd
+from experiments.calibrate.joint import ranges_of
 from experiments.calibrate.optimum_stage import find_optimum
 from experiments.calibrate.results import ClimbResult, SurfaceResult, TargetResult
 from experiments.calibrate.surface_stage import climbed_box, explore_surface, require_slope
@@ -85,6 +86,11 @@ def test_a_range_that_ends_where_nothing_was_explored_is_open_there() -> None:
     assert region.ranges.to_numpy() == pytest.approx(
         np.array(ends), abs=(0.014 + 10 * NOISE / 3.0) * HALF_RANGE
     )
+    # Where E ends at its limit nothing is beyond, so that this end is not open.
+    low = region.ranges.at["E", "low"]
+    ranges = ranges_of(region, None, {"E": (low - 1e-9, math.inf), "F": (low - 0.01, math.inf)})
+    assert ranges["low_open"].tolist() == [False, True]
+    assert ranges.at["E", "low"] == low - 1e-9
     closed = replace(region, mask=np.linalg.norm(region.coded, axis=1) < 0.5)
     assert not closed.open_ends.to_numpy().any()
     band = replace(region, mask=region.explored & (region.coded["E"].abs() < 0.5).to_numpy())

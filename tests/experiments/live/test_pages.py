@@ -292,10 +292,16 @@ def test_from_an_stl_to_a_heap_in_the_browser(
         assert study.case({}, seed=1).grains.shape.sphere_count == 2
         wait(page, "document.querySelector('#study').value === 'rye.toml'")
         page.select_option("#command", "heap")
+        page.fill("#device", "moon")
+        page.press("#device", "Tab")
+        wait(page, "document.querySelector('#run-error').innerText.includes('moon')")
+        # a slow press ends the change of the field: the error goes, the command comes, and the press counts
         page.fill("#device", "cpu")
-        page.click("#start")  # ends the change of the field, and counts
+        page.hover("#start")
+        page.mouse.down()
         command = "dem-warp heap rye.toml --out out/rye-heap-1 --device cpu"
         wait(page, f"document.querySelector('#run-command').innerText === {command!r}")
+        page.mouse.up()
         wait(page, "document.querySelector('#runs .badge.finished')")
         check(page, place)
         link = page.evaluate("document.querySelector('#runs a').href")

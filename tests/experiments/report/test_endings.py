@@ -65,6 +65,8 @@ def test_every_ending_is_a_clear_report(outcome: Outcome) -> None:
     assert reached <= set(page.ids)
     assert not {"climb", "surface", "optimum", "verification"} - reached & set(page.ids)
     assert ("Not reached:" in page.text) == (len(reached) < 8)
+    assert ("These values miss the target" in page.text) == (outcome is Outcome.MISSED)
+    assert "Enter these values" not in page.text
 
 
 @pytest.mark.parametrize("names", [("F",), ("E", "F", "G")])

@@ -113,7 +113,8 @@ def test_the_values_to_enter_hold_the_fixed_ones_and_the_simulated_modulus() -> 
     assert float(rows["grain, shear modulus"][1][0].removesuffix(" Pa")) == case.grain_material.shear_modulus
     assert f"divided by {study.numerics.modulus_scale:g}" in rows["grain, shear modulus"][2][0]
     assert rows["grain, density"][1][0] == "698 kg/m^3"
-    assert {"wall, poisson ratio", "wall, density", "contact laws", "grain, size sd"} <= set(rows)
+    assert {"wall, poisson ratio", "wall, density", "contact laws"} <= set(rows)
+    assert rows["grain, sizes"][1][0] == "1 +- 0.05 of the shape, normal, cut at 3 sd"
     [modulus] = [row for row in page.rows("values") if row[1][0] == "B"]
     assert modulus[-1][0].endswith(f"enter it divided by {study.numerics.modulus_scale:g}, as simulated")
 

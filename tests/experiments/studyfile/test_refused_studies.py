@@ -100,6 +100,9 @@ REFUSED = [
     changed(
         "modulus_scale = 400.0", "modulus_scale = 1e12", "numerics.modulus_scale", "modulus of 1 kPa or more"
     ),
+    changed('density = "700 kg/m^3"', 'density = "1.250,5 kg/m^3"', "grain.density", 'any: "1250.5 kg/m^3"'),
+    changed('density = "700 kg/m^3"', 'density = "1 250 kg/m^3"', "grain.density", 'any: "1250 kg/m^3"'),
+    changed('density = "700 kg/m^3"', 'density = "1,250.5 kg/m^3"', "grain.density", 'any: "1250.5 kg/m^3"'),
     changed('sd = "0.5 deg"\n', "", "target", "missing: sd"),
     changed("low = 0.2", "low = 0.9", "factor[1]", "low must be below high"),
     changed("low = 0.2", "low = -0.2", "factor[1]", "must stay within 0"),
