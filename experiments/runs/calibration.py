@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -80,14 +79,10 @@ def run_campaign(run: Run, on_stage: StageHook | None = None) -> Campaign:
         if on_stage:
             on_stage(name, result)
 
-    started = time.perf_counter()
     campaign = calibrate(run.study, simulate, note)
     key = campaign.cases["case_key"].iloc[0]
-    provenance = {
-        **run.provenance,
-        "seconds": round(time.perf_counter() - started, 1),
-        "engine": run.store.load(key).provenance if run.store.has(key) else {},
-    }
+    engine = run.store.load(key).provenance if run.store.has(key) else {}
+    provenance = run.provenance | {"engine": engine}
     with run.publishing() as drafts:
         pictures = [] if run.is_by_hand else heap_pictures(campaign, run.study, run.store.load)
         solid = None if run.is_by_hand else verified_heap(campaign, run.store.load)

@@ -134,9 +134,10 @@ class Run:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Commit, day and workers."""
-        day = datetime.datetime.now(datetime.UTC).date().isoformat()
-        return {"commit": source_commit(), "date": day, **self.workers.described}
+        """Commit, day, workers, and the wall time of all batches, those of earlier parts of the run too."""
+        day, seconds = datetime.datetime.now(datetime.UTC).date(), sum(b["seconds"] for b in self.wall_times)
+        made = {"commit": source_commit(), "date": day.isoformat(), **self.workers.described}
+        return made | {"seconds": round(seconds, 1)}
 
 
 @contextmanager

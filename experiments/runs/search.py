@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -121,9 +120,9 @@ def run_search(prepared: Prepared, given: SearchData) -> SearchResult:
             with run.publishing(**made_from) as drafts:
                 search.settings.write(drafts / SETTINGS)
             return SearchResult(None, terms, run.folder / BANK)
-        simulator.title, started = "fresh runs", time.perf_counter()
+        simulator.title = "fresh runs"
         found = drive(search.analysis(measured, bank, given.seed), simulator)
-        provenance = _provenance(run, given, bank) | {"seconds": round(time.perf_counter() - started, 1)}
+        provenance = _provenance(run, given, bank)
         pictures, solid = (
             ([], None) if run.is_by_hand else heaps_side_by_side(engine, found, terms, measured, given.seed)
         )

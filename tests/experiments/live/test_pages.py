@@ -292,11 +292,12 @@ def test_from_an_stl_to_a_heap_in_the_browser(
         assert study.case({}, seed=1).grains.shape.sphere_count == 2
         wait(page, "document.querySelector('#study').value === 'rye.toml'")
         page.select_option("#command", "heap")
-        page.fill("#device", "moon")
-        page.press("#device", "Tab")
+        page.fill("#device", "cpu")
+        page.fill("#scale", "moon")
+        page.click("#start")
         wait(page, "document.querySelector('#run-error').innerText.includes('moon')")
         # a slow press ends the change of the field: the error goes, the command comes, and the press counts
-        page.fill("#device", "cpu")
+        page.fill("#scale", "")
         page.hover("#start")
         page.mouse.down()
         command = "dem-warp heap rye.toml --out out/rye-heap-1 --device cpu"

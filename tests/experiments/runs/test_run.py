@@ -257,3 +257,6 @@ def test_a_run_that_was_killed_and_resumed_has_the_wall_time_of_all_its_parts(
     assert rows["stage"].tolist() == ["climb", "climb"]
     assert rows["simulated"].tolist() == [0, 1]
     assert rows["seconds"].tolist() == [60.0, 9.0]
+    workers: Any = SimpleNamespace(described={})
+    run = run_folder.Run(small_study, tmp_path, workers, workers, journal, lambda _: nullcontext())
+    assert run.provenance["seconds"] == 69.0
