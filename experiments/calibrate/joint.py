@@ -50,7 +50,7 @@ def ranges_of(
         ranges = region.ranges.join(region.open_ends.add_suffix("_open"))
     for factor in region.factors:
         for end, limit in zip(("low", "high"), limits[factor.name], strict=True):
-            if abs(ranges.at[factor.name, end] - limit) < 1e-6 * factor.half_range:
+            if abs(ranges.loc[factor.name, end] - limit) < 1e-6 * factor.half_range:
                 ranges.loc[factor.name, [end, f"{end}_open"]] = limit, False
     return ranges
 

@@ -55,7 +55,7 @@ class Quantity:
             quantity = value
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             quantity = cls(_float(value))
-        elif (text := _spelled(value)) and (found := _MARKS.fullmatch(text)) and not _FLOAT.fullmatch(found[1]):
+        elif (found := _MARKS.fullmatch(text := _spelled(value))) and not _FLOAT.fullmatch(found[1]):
             raise ValueError(_marks_problem(*found.groups()))
         elif text and (match := _TEXT.fullmatch(text)):
             quantity = cls(float(match[1]), _POWER.sub(r"\1^\2", match[2]))
@@ -94,7 +94,7 @@ class Quantity:
 
 def _marks_problem(number: str, rest: str) -> str:
     """Name both readings of a comma or another mark: a decimal one, and a separator of thousands."""
-    head, mark, tail = re.fullmatch(r"(.*)([.,\s'’_])(\d+)", number).groups()
+    head, mark, tail = re.split(r"([.,\s'’_])(?=\d+$)", number)
     whole = re.sub(r"[.,\s'’_]", "", head)
     decimal = mark in ".," and mark not in head and (head == whole or _THOUSANDS.fullmatch(head))
     readings = [f"{whole}.{tail}"] if decimal else []

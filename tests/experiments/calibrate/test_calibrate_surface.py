@@ -87,10 +87,10 @@ def test_a_range_that_ends_where_nothing_was_explored_is_open_there() -> None:
         np.array(ends), abs=(0.014 + 10 * NOISE / 3.0) * HALF_RANGE
     )
     # Where E ends at its limit nothing is beyond, so that this end is not open.
-    low = region.ranges.at["E", "low"]
+    low = region.ranges.loc["E", "low"]
     ranges = ranges_of(region, None, {"E": (low - 1e-9, math.inf), "F": (low - 0.01, math.inf)})
     assert ranges["low_open"].tolist() == [False, True]
-    assert ranges.at["E", "low"] == low - 1e-9
+    assert ranges.loc["E", "low"] == low - 1e-9
     closed = replace(region, mask=np.linalg.norm(region.coded, axis=1) < 0.5)
     assert not closed.open_ends.to_numpy().any()
     band = replace(region, mask=region.explored & (region.coded["E"].abs() < 0.5).to_numpy())
