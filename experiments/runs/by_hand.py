@@ -265,26 +265,31 @@ def _require_unchanged(run: AskedRun, row: Row) -> None:
 
 def _require_filled(asked: Sequence[AskedRun], filled: Mapping[str, Row]) -> None:
     """Refuse a sheet of which some runs have no result; one without any result waits."""
-    empty = [filled[run.key] for run in asked if not _is_filled(filled[run.key], run.results)]
-    if not empty:
+    lacking = {run.key: heads for run in asked if (heads := _lacking(filled[run.key], run.results))}
+    if not lacking:
         return
+    empty = [filled[key] for key in lacking]
     path = empty[0].file
-    if len(empty) == sum(filled[run.key].file == path for run in asked):
+    here = [run for run in asked if filled[run.key].file == path]
+    if not any(filled[run.key][head] for run in here for head in _heads(run.results)):
         raise AwaitingRuns(_waiting(path, len(empty)))
     lines = ", ".join(
         f"{row['stage']} run {row['run']} repeat {row['repeat']} (line {row.line})" for row in empty[:LISTED]
     )
     more = f" and {len(empty) - LISTED} more" if len(empty) > LISTED else ""
-    raise InputError(str(path), f"has no result yet for {lines}{more}")
+    columns = ", ".join(dict.fromkeys(head for heads in lacking.values() for head in heads))
+    raise InputError(str(path), f"has no {columns} yet for {lines}{more}")
 
 
 def _failed(row: Row, results: Sequence[Result]) -> bool:
     return FAILED in [row[head].lower() for head in _heads(results)]
 
 
-def _is_filled(row: Row, results: Sequence[Result]) -> bool:
-    shown = bool(row[PICTURE])
-    return _failed(row, results) or all(row[each.head] for each in results if not (shown and each.pictured))
+def _lacking(row: Row, results: Sequence[Result]) -> list[str]:
+    """Name the columns of a run that lack a result; a picture stands for what it can show."""
+    if _failed(row, results):
+        return []
+    return [each.head for each in results if not (row[each.head] or (row[PICTURE] and each.pictured))]
 
 
 def _value(row: Row, result: Result) -> float:

@@ -88,7 +88,7 @@ class LinearFit:
             "significant at 0.05": significant_words(self.coefficient_table),
         }
         anova = None if "- 1" in self.formula else self.anova
-        return summary_text(f"Fit of {self.formula}", self.coefficient_table, anova, facts)
+        return summary_text(f"Fit of {_unquoted(self.formula)}", self.coefficient_table, anova, facts)
 
     def __repr__(self) -> str:
         return f"LinearFit {self.formula!r}: {len(self.table)} observations, R2 {self.fit.rsquared:.4f}"

@@ -139,7 +139,10 @@ def test_a_sheet_that_is_not_as_it_was_written_is_refused(study: Path) -> None:
     filled = sheet.read_text(encoding="utf-8")
     lines = filled.splitlines()
     for wrong, message in [
-        ("\n".join([*lines[:-1], empty.splitlines()[-1]]), "has no result yet for screening run 12 repeat 1"),
+        (
+            "\n".join([*lines[:-1], empty.splitlines()[-1]]),
+            "has no angle [deg] yet for screening run 12 ",
+        ),
         (filled.replace(",0.29,", ",0.3,", 1), "A [1]: must stay as the campaign wrote it, 0.29, got 0.3"),
         ("\n".join([*lines[:-1], lines[-1].rsplit(",", 2)[0] + ",steep,"]), "must be a number, got steep"),
         ("\n".join([*lines[:-1], lines[-1].rsplit(",", 2)[0] + ",inf,"]), "must be a number, got inf"),
@@ -221,6 +224,13 @@ def test_a_search_names_a_hidden_tilt_from_runs_that_a_person_typed_in(
     columns = ["condition", "replicate", "observable", "value", "unit"]
     pd.DataFrame(cells, columns=columns).to_csv("measured.csv", index=False)
     code, said = search()
+    leave_a_column_out(Path("found/by-hand/01-bank.csv"))
+    code, said = search("--resume")
+    assert code == 2
+    assert "01-bank.csv: has no concavity [1], height [m], r50 [m]" in said
+    assert "yet for bank run 1 repeat 1 (line" in said
+    shutil.rmtree("found")
+    code, said = search()
     for _ in range(12):
         assert code == 0, said
         if Path("found/report.html").is_file():
@@ -230,6 +240,14 @@ def test_a_search_names_a_hidden_tilt_from_runs_that_a_person_typed_in(
         code, said = search("--resume")
     found = json.loads(Path("found/results.json").read_text(encoding="utf-8"))["discovery"]
     assert (found["verdict"], found["named"]) == ("named", ["plate_tilt"])
+
+
+def leave_a_column_out(sheet: Path) -> None:
+    """Type in the first result of all runs alone."""
+    text = sheet.read_text(encoding="utf-8")
+    head = "".join(line for line in text.splitlines(True) if line.startswith("#"))
+    runs = pd.read_csv(sheet, comment="#", dtype=str).assign(**{"flank_angle [deg]": "20"})
+    sheet.write_text(head + runs.to_csv(index=False), encoding="utf-8")
 
 
 def answer(sheet: Path, person: EmulatedSimulator) -> None:
