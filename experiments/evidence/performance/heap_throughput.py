@@ -5,7 +5,7 @@ are moved on too, but meet nobody: `of free grains` leaves them out. The columns
 (`--columns`); worlds beyond `--seeds` hold the same columns at other moments.
 
     python -m experiments.evidence.performance.heap_throughput --scale soft --device cpu --processes 2
-    python -m experiments.evidence.performance.heap_throughput --scale paper --device cuda --worlds 1,128
+    python -m experiments.evidence.performance.heap_throughput --scale printed --device cuda --worlds 1,128
 
 Every table goes to `--out` as CSV, and all of them to throughput.md, which `performance_record` puts into
 README.md.
@@ -72,7 +72,7 @@ def _speed_row(solver: Solver, timing: Timing, traffic: Traffic, bandwidth: floa
 
 
 def main(
-    scale: Annotated[str, typer.Option(help="Scale of the buckwheat study: bench, soft or paper.")] = "soft",
+    scale: Annotated[str, typer.Option(help="Scale of the buckwheat study: bench, soft, paper or printed.")] = "soft",
     device: OneDevice = "cpu",
     worlds: Annotated[str, typer.Option(help="Numbers of worlds to measure, such as 1,12,31,128.")] = "1",
     seeds: Annotated[int, typer.Option(help="Most columns to simulate beforehand.")] = 32,

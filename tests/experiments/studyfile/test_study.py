@@ -167,7 +167,7 @@ def test_factor_values_are_in_the_factors_unit() -> None:
 
 
 def test_bench_is_a_twin_and_leaves_the_paper_alone() -> None:
-    assert study_scales() == ("paper", "soft", "bench")
+    assert study_scales() == ("paper", "printed", "soft", "bench")
     bench, paper = load_study(scale="bench"), load_study(scale="paper")
     assert bench.target.twin is not None
     assert paper.target.twin is None

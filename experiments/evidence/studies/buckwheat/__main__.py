@@ -1,6 +1,6 @@
 """The paper's runs simulated again: every run of its Tables 3, 5 and 6 and of its verification.
 
-    python -m experiments.evidence.studies.buckwheat --scale paper --device cuda --out out/paper
+    python -m experiments.evidence.studies.buckwheat --scale printed --device cuda --out out/paper
 
 Each of the paper's stages is one batch. The page is ``record/README.md`` in the folder; ``--campaign`` also
 runs the campaign of the study in the same folder, and the page compares both.

@@ -35,7 +35,7 @@ app = typer.Typer(help=__doc__, no_args_is_help=True)
 def simulate(
     base: Annotated[list[str] | None, typer.Option(help="Name of a base. Default: all.")] = None,
     replicates: Annotated[int, typer.Option(min=1, help="Heaps of each run.")] = 1,
-    scale: Annotated[str, typer.Option(help="Scale of the study.")] = "paper",
+    scale: Annotated[str, typer.Option(help="Scale of the study.")] = "printed",
     modulus_scale: Annotated[
         float | None, typer.Option(min=1.0, help="Divisor of the shear modulus. Default: the scale's.")
     ] = None,

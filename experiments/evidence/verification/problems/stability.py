@@ -17,7 +17,7 @@ FRACTIONS = (0.25, 0.5, 1.0)
 SCALES = {
     "cpu": ("bench", "Here at bench scale: 400 grains, shear modulus / 400."),
     "cuda": (
-        "paper",
+        "printed",
         "Here at the paper's size, moduli and time step; on the GPU all are worlds of one batch.",
     ),
 }

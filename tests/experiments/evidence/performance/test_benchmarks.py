@@ -28,7 +28,7 @@ from experiments.studyfile import load_study
 DEVICE = "cpu"
 
 
-@pytest.mark.parametrize("scale", ["bench", "soft", "paper"])
+@pytest.mark.parametrize("scale", ["bench", "soft", "printed"])
 def test_columns_hold_the_study_s_centre_point_in_one_size(scale: str) -> None:
     case, ours = load_study(scale=scale).case({}, 3), reference_case(scale, 3)
     assert (ours.scene, ours.numerics, ours.seed) == (case.scene, case.numerics, case.seed)
@@ -39,7 +39,7 @@ def test_columns_hold_the_study_s_centre_point_in_one_size(scale: str) -> None:
 
 
 def test_an_unknown_scale_is_refused() -> None:
-    with pytest.raises(ValueError, match="scale: must be one of paper, soft, bench, got 'huge'"):
+    with pytest.raises(ValueError, match="scale: must be one of printed, soft, bench, got 'huge'"):
         reference_case("huge")
 
 

@@ -60,7 +60,7 @@ def heaps() -> pd.DataFrame:
 
 
 def test_every_base_is_another_case_of_the_paper() -> None:
-    cases = [load_study(None, "paper", base_changes(name)).case({}, 1).to_dict() for name in BASES]
+    cases = [load_study(None, "printed", base_changes(name)).case({}, 1).to_dict() for name in BASES]
     assert len({str(case) for case in cases}) == len(BASES) == 10
     assert {case["numerics"]["modulus_scale"] for case in cases} == {1.0}
 

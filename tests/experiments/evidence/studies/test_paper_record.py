@@ -53,7 +53,7 @@ def test_the_committed_card_is_that_of_the_committed_campaign() -> None:
     card = tomllib.loads((paper_page.FOLDER / CARD).read_text(encoding="utf-8"))
     campaign = json.loads((paper_page.FOLDER / paper_page.CAMPAIGN).read_text(encoding="utf-8"))
     assert (card["fitted"]["outcome"], card["fitted"]["reason"]) == (campaign["outcome"], campaign["reason"])
-    study = load_study(None, "paper")
+    study = load_study(None, "printed")
     case = study.case({name: factor["chosen"] for name, factor in card["factor"].items()}, 1)
     own = with_material({"material": CARD}, paper_page.FOLDER)
     assert own["grain"]["density"] == "698 kg/m^3"

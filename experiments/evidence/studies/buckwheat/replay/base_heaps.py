@@ -64,7 +64,7 @@ def simulate_base(
     name: str,
     folder: Path,
     replicates: int,
-    scale: str = "paper",
+    scale: str = "printed",
     modulus_scale: float | None = None,
     workers: OwnWorkers = THIS_MACHINE,
 ) -> pd.DataFrame:
