@@ -95,7 +95,7 @@ def test_a_wrong_study_is_answered_without_simulator_statistics_or_pictures(tmp_
 def test_other_commands_check_a_study_and_a_heap_as_early(tmp_path: Path) -> None:
     study = wrong_study(tmp_path, "a wrong unit").rename(tmp_path / "unit.toml")
     commands = [["heap", study.name], ["discover", study.name, "measured.csv"]]
-    commands.append(["calibrate", "--engine", "nobody"])
+    commands.append(["calibrate", "--scale", "bench", "--engine", "nobody"])
     heaps = [kind for kind in WRONG if "grains" in kind]
     for number, kind in enumerate(heaps):
         wrong_study(tmp_path, kind).rename(tmp_path / f"{number}.toml")
