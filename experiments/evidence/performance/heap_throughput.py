@@ -72,7 +72,7 @@ def _speed_row(solver: Solver, timing: Timing, traffic: Traffic, bandwidth: floa
 
 
 def main(
-    scale: Annotated[str, typer.Option(help="Scale of the buckwheat study: bench, soft, paper or printed.")] = "soft",
+    scale: Annotated[str, typer.Option(help="Scale of the study: bench, soft or printed.")] = "soft",
     device: OneDevice = "cpu",
     worlds: Annotated[str, typer.Option(help="Numbers of worlds to measure, such as 1,12,31,128.")] = "1",
     seeds: Annotated[int, typer.Option(help="Most columns to simulate beforehand.")] = 32,
