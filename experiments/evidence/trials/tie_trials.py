@@ -1,0 +1,144 @@
+"""The next experiment, in emulated ties: how often the proposed condition settles one, next to other choices.
+
+    python -m experiments.evidence.trials.tie_trials
+    python -m experiments.evidence.trials.tie_trials --count 10 --table out/ties.csv
+
+The world is that of `slip_trials`; the search has a bank that is drawn from it, and fresh runs. Where it ends
+in a tie, each condition is repeated in turn, in as many heaps as the search proposes, and searched again.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import combinations, count, islice
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+import typer
+
+from doe.discrepancy import Discovery, Emulator, Measured, Verdict, analyse, drive, fit_emulator
+from doe.discrepancy.fitting.model_fit import Fitted
+from doe.discrepancy.verdict.next_experiment import TIMES, propose
+from experiments.evidence.record_page import markdown_table
+from experiments.evidence.trials.baselines.emulated_world import (
+    REPLICATES,
+    emulated_heaps,
+    fresh_runs,
+    redrawn_bank,
+    true_world,
+)
+from experiments.evidence.trials.baselines.method_tables import paired
+from experiments.evidence.trials.baselines.protocol import Problem
+
+TABLE = Path(__file__).with_name("record") / "ties.csv"
+BANKS = 4
+HIDDEN, SIZES = ("contact_adhesion", "liquid_bridges", "rolling_torque"), (0.1, 0.5)
+"""Effects that tie with one another, and coded sizes at which they do."""
+OUTCOMES = ("the truth", "a tie", "unknown", "nothing", "a wrong name")
+"""Answers after the repetition, the best first."""
+SEARCH, RANDOM = "the search", "random"
+CHOICES = (SEARCH, "the same, bank alone", "2604.01231", RANDOM)
+
+
+@cache
+def bank_of(number: int) -> Emulator:
+    """Fit a bank of the world."""
+    return fit_emulator(redrawn_bank(*true_world(), number))
+
+
+def heaps_of(number: int) -> tuple[Measured, str, float]:
+    """Draw all heaps that anyone may measure of a twin; return its effect, too."""
+    truth, settings = true_world()
+    space, rng = truth.emulator.space, np.random.default_rng([number, 4])
+    theta, hidden = rng.uniform(space.lower, space.upper).tolist(), HIDDEN[number % len(HIDDEN)]
+    size = space.natural_size(hidden, rng.uniform(*SIZES))
+    most = (1 + TIMES[-1]) * REPLICATES
+    return emulated_heaps(truth, theta, {hidden: size}, most, number, settings.systematic), hidden, size
+
+
+def searched(heaps: Measured, number: int, condition: str = "", more: int = 0) -> tuple[Problem, Discovery]:
+    """Search the first heaps of every condition, and more of one."""
+    counts = {name: REPLICATES + more * (name == condition) for name in heaps.conditions}
+    values = {name: rows[: counts[name]] for name, rows in heaps.values.items()}  # noqa: PD011
+    seen, settings = replace(heaps, values=values, reasons={}), true_world()[1]
+    problem = Problem(str(number), bank_of(number % BANKS), seen, settings, number)
+    return problem, drive(analyse(seen, problem.emulator, settings, number), fresh_runs)
+
+
+def contrast(models: Sequence[Fitted], condition: str) -> float:
+    """Compute the criterion of arXiv:2604.01231 for a condition.
+
+    It is the mean over pairs of plausible models of the largest squared difference of their predictions, at
+    their fits. Where its authors have one observable, there are several here, in deviations of one run.
+    """
+    sd = np.sqrt(np.diag(models[0].model.run_covariance(models[0].x, condition)))
+    means = [one.model.predict(one.x[None], condition)[0] / sd for one in models]
+    return float(np.mean([np.max((one - other) ** 2) for one, other in combinations(means, 2)]))
+
+
+def outcome(found: Discovery, hidden: str) -> str:
+    """Classify an answer."""
+    if found.verdict is Verdict.NAMED:
+        return "the truth" if found.named == (hidden,) else "a wrong name"
+    return {Verdict.TIE: "a tie", Verdict.UNKNOWN: "unknown"}.get(found.verdict, "nothing")
+
+
+def ties(start: int) -> Iterator[dict[str, object]]:
+    """Yield ties from a twin on: the choices of a condition, and the answer after each is repeated."""
+    for number in count(start):
+        heaps, hidden, size = heaps_of(number)
+        problem, found = searched(heaps, number)
+        step = found.next_experiment
+        if found.verdict is not Verdict.TIE or step is None:
+            continue
+        models = sorted((problem.fitted((name,)) for name in found.named), key=lambda one: one.score)
+        on_bank = propose(models[0], models[1], step.replicates, wanted_q=0.0).condition
+        drawn = str(np.random.default_rng([number, 5]).choice(heaps.conditions))
+        farthest = max(heaps.conditions, key=lambda name: contrast(models, name))
+        again = {c: searched(heaps, number, c, step.replicates)[1] for c in heaps.conditions}
+        row = {"twin": number, "hidden": hidden, "size": f"{size:.4g}", "tied": " ".join(found.named)}
+        row |= {"heaps": step.replicates, "expected": step.settles}
+        row |= dict(zip(CHOICES, (step.condition, on_bank, farthest, drawn), strict=True))
+        yield row | {name: outcome(one, hidden) for name, one in again.items()}
+
+
+def compared(table: pd.DataFrame) -> pd.DataFrame:
+    """Compare the choices: the share of ties that each settles, and McNemar's test against the search."""
+    after = table.loc[:, RANDOM:].iloc[:, 1:]
+    ends = {one: pd.Series([row[row[one]] for _, row in table.iterrows()]) for one in CHOICES}
+    ends["best in hindsight"] = after.map(OUTCOMES.index).min(axis=1).map(OUTCOMES.__getitem__)
+    ends |= {f"always {name}": after[name] for name in after}
+    own, rows = ends[SEARCH] == OUTCOMES[0], []
+    for name, end in ends.items():
+        right = end == OUTCOMES[0]
+        gap, share = (
+            100.0 * (own.astype(float) - right),
+            f"{100 * right.mean():.0f} ({100 * right.sem():.1f})",
+        )
+        rows.append({"condition": name, "the truth alone, % (se)": share})
+        rows[-1] |= {one: str((end == one).sum()) for one in OUTCOMES[1:]}
+        rows[-1]["the search more, % (se)"] = f"{gap.mean():+.0f} ({gap.sem():.1f})"
+        rows[-1]["only the search : only it"] = str(paired(own, right))
+    settled = own.groupby(table["expected"].map({True: "expected to settle", False: "not expected to"}))
+    for word, each in settled:
+        share = f"{100 * each.mean():.0f} ({100 * each.sem():.1f})"
+        rows.append({"condition": f"{word}: {len(each)}", "the truth alone, % (se)": share})
+    return pd.DataFrame(rows).fillna("")
+
+
+def main(
+    number: Annotated[int, typer.Option("--count", help="Ties.", min=1)] = 100,
+    table: Annotated[Path, typer.Option(help="Table of the record; it may be begun.")] = TABLE,
+) -> None:
+    """Draw ties, settle them, and print what each choice of a condition gives."""
+    rows = pd.read_csv(table).to_dict("records") if table.is_file() else []
+    for row in islice(ties(int(rows[-1]["twin"]) + 1 if rows else 0), number - len(rows)):
+        rows.append({str(name): value for name, value in row.items()})
+        pd.DataFrame(rows).to_csv(table, index=False, lineterminator="\n")
+    print(markdown_table(compared(pd.read_csv(table))))
+
+
+if __name__ == "__main__":
+    typer.run(main)
