@@ -73,6 +73,8 @@ class Translation:
     def __post_init__(self) -> None:
         if self.main not in self.files:
             raise ValueError(f"Translation.main: must be one of {', '.join(self.files)}, got {self.main!r}")
+        if isinstance(self.warnings, str):
+            raise ValueError(f"Translation.warnings: must be a tuple of texts, got {self.warnings!r}")
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the texts as data for JSON."""

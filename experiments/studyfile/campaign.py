@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from experiments.studyfile.schema import Angle, Section, nested_error
 
@@ -73,12 +73,19 @@ class ScreeningSettings(Section):
 
     design: str = "plackett-burman"
     """Name of the design; packages from outside add further ones."""
-    runs: int | None = Field(default=None, ge=4, le=MOST, multiple_of=4)
+    runs: int | None = Field(default=None, ge=4, le=MOST)
     """Runs of the design. Default: the fewest that leave ``dummies`` columns free."""
     dummies: int = Field(default=3, ge=0, le=MOST)
     """Dummy columns wanted when ``runs`` is omitted: each is one degree of freedom of the error."""
     replicates: int = Field(default=1, ge=1, le=MOST)
     """Cases of each run."""
+
+    @field_validator("runs")
+    @classmethod
+    def _runs_of_the_design(cls, runs: int | None, info: ValidationInfo) -> int | None:
+        if runs and runs % 4 and info.data.get("design") == "plackett-burman":
+            raise ValueError("must be a multiple of 4")
+        return runs
 
 
 class SelectionSettings(Section):

@@ -8,7 +8,7 @@ import pytest
 
 from dem_warp import PRESETS
 from dem_warp.case import Case
-from experiments.export import EXPORTERS, Contact, contacts_of, values
+from experiments.export import EXPORTERS, Contact, Translation, contacts_of, values
 from experiments.export.lammps_exporter import TSUJI, granular_words
 from experiments.studyfile import load_study
 
@@ -93,3 +93,8 @@ def test_what_no_other_code_has_is_refused(case: Case) -> None:
     with_more = load_study(scale="soft", changes=changes).case({}, 1)
     with pytest.raises(ValueError, match=r"terms for the base law alone, got \['micro_slip'\]"):
         contacts_of(with_more, RADIUS, MASS)
+
+
+def test_warnings_of_a_translation_are_several_texts() -> None:
+    with pytest.raises(ValueError, match="warnings: must be a tuple of texts, got 'the code lacks the tube'"):
+        Translation({"lift.in": ""}, "lift.in", (), "", (), "the code lacks the tube")  # type: ignore[arg-type]

@@ -266,3 +266,9 @@ def test_a_new_study_loads_and_never_overwrites(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="never overwrites"):
         write_template("my grain", tmp_path)
     assert path.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_design_from_outside_may_have_any_number_of_runs() -> None:
+    assert campaign.ScreeningSettings(design="three-levels", runs=9).runs == 9
+    with pytest.raises(ValueError, match="must be a multiple of 4"):
+        campaign.ScreeningSettings(runs=9)
