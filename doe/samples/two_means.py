@@ -30,6 +30,8 @@ class Comparison:
     df: float
     alpha: float
     margin: float | None
+    equivalence_alpha: float
+    """Level of the two one-sided tests."""
 
     @property
     def t(self) -> float:
@@ -62,13 +64,13 @@ class Comparison:
 
     @property
     def equivalent(self) -> bool | None:
-        """True if the means are shown to differ by less than the margin, at alpha; None without a margin."""
-        return None if self.equivalence_p is None else self.equivalence_p < self.alpha
+        """True if the means are shown to differ by less than the margin; None without a margin."""
+        return None if self.equivalence_p is None else self.equivalence_p < self.equivalence_alpha
 
     @property
     def smallest_margin(self) -> float:
-        """Smallest margin for which these data show equivalence at alpha."""
-        return abs(self.difference) + self._critical(2.0 * self.alpha) * self.se
+        """Smallest margin for which these data show equivalence."""
+        return abs(self.difference) + self._critical(2.0 * self.equivalence_alpha) * self.se
 
     @property
     def _guard(self) -> tuple[TwoErrors, float] | None:
@@ -98,6 +100,7 @@ def compare_means(
     margin: float | None = None,
     method: str = "welch",
     alpha: float = 0.05,
+    equivalence_alpha: float | None = None,
 ) -> Comparison:
     """Compare the means of two samples.
 
@@ -114,6 +117,9 @@ def compare_means(
         becomes .12 with 2 and 12); a against the number b.
     alpha : float
         Level of the tests; 1 - alpha is that of the interval. With a margin below .5.
+    equivalence_alpha : float, optional
+        Level of the test of equivalence, below .5. Default: alpha. Several comparisons of which *all* must show
+        equivalence need no smaller one: together they hold it (Berger, *Technometrics* 24 (1982) 295).
 
     Raises
     ------
@@ -126,8 +132,9 @@ def compare_means(
         margin = checked_number("an equivalence margin", margin)
         if not margin > 0.0:
             raise DesignError(f"an equivalence margin must be positive, got {margin:g}")
-    if checked_level(alpha) >= 0.5 and margin is not None:
-        raise DesignError(f"alpha of a test of equivalence must be below 0.5, got {alpha}")
+    equivalence_alpha = checked_level(checked_level(alpha) if equivalence_alpha is None else equivalence_alpha)
+    if equivalence_alpha >= 0.5 and margin is not None:
+        raise DesignError(f"alpha of a test of equivalence must be below 0.5, got {equivalence_alpha}")
     first = Sample.of(a)
     if method == "one-sample":
         if isinstance(b, Sample) or np.ndim(b) > 0:
@@ -144,7 +151,8 @@ def compare_means(
     if not se > 0.0:
         raise DesignError("no test without spread: every value of the samples is the same")
     known = second.mean if isinstance(second, Sample) else second
-    return Comparison(first, second, method, first.mean - known, se, df, float(alpha), margin)
+    difference = first.mean - known
+    return Comparison(first, second, method, difference, se, df, float(alpha), margin, equivalence_alpha)
 
 
 def _difference_error(a: Sample, b: Sample | float, method: str) -> tuple[float, float]:

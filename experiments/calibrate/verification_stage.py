@@ -23,7 +23,8 @@ def plan_verification(study: Study, optimum: OptimumResult) -> pd.DataFrame:
 def verify(study: Study, optimum: OptimumResult, target: TargetResult, runner: Runner) -> VerificationResult:
     """Simulate the chosen point with fresh seeds; test every response for a difference and for equivalence.
 
-    The level of the tests is shared among the responses (Bonferroni). StageEnd with fewer than two values.
+    The level of the tests for a difference is shared among the responses (Bonferroni). That of equivalence is
+    not: all must show it. StageEnd with fewer than two values.
     """
     settings, responses = study.campaign.verification, study.target.responses
     cases = runner(plan_verification(study, optimum))
@@ -34,7 +35,9 @@ def verify(study: Study, optimum: OptimumResult, target: TargetResult, runner: R
         margin = settings.margin if response is responses[0] else None
         margin = settings.margin_sds * aim.sd if margin is None else margin
         values = values_of(cases, STAGE, response)
-        tests[response.name] = compare_means(values, aim, margin=margin, alpha=alpha)
+        tests[response.name] = compare_means(
+            values, aim, margin=margin, alpha=alpha, equivalence_alpha=settings.alpha
+        )
     verified = all(test.equivalent and not test.different for test in tests.values())
     decisions = [_decision(response, tests[response.name], cases) for response in responses]
     return VerificationResult(tests, cases, verified, tuple(decisions))
@@ -50,7 +53,8 @@ def _decision(response: Response, test: Comparison, cases: pd.DataFrame) -> Deci
     return Decision(
         STAGE,
         f"Welch's two-sample t-test of fresh cases against the target of the {response.name}{held_out}, at "
-        f"{test.alpha:.3g}, and two one-sided tests (TOST) of equivalence within {margin}.",
+        f"{test.alpha:.3g}, and two one-sided tests (TOST) of equivalence within {margin}, at "
+        f"{test.equivalence_alpha:.3g}.",
         {
             key_of("mean", response): test.a.mean,
             key_of("sd", response): test.a.sd,
