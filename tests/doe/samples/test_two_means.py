@@ -1,11 +1,13 @@
 """Comparison of means: scipy's t-tests, the interval, equivalence and its error rate."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy import stats
 from statsmodels.stats.weightstats import ttost_ind
 
-from doe import Sample, compare_means
+from doe import DesignError, Sample, compare_means
 
 A = np.array([30.1, 31.6, 29.3, 30.4])
 B = np.array([29.8, 30.2, 30.0, 30.6, 29.9, 30.1])
@@ -57,3 +59,24 @@ def test_means_that_differ_by_the_margin_pass_as_equivalent_in_five_percent():
     ]
     # At the border of the margin the test's level is exact; 3.5 binomial standard deviations.
     assert np.mean(passed) == pytest.approx(0.05, abs=3.5 * np.sqrt(0.05 * 0.95 / trials))
+
+
+def test_all_comparisons_show_equivalence_by_chance_at_most_at_the_level_of_each() -> None:
+    """One of four means differs by the margin: all four are called equivalent in 5 of 100 at most."""
+    rng, trials = np.random.default_rng(8), 1000
+    apart = np.array([1.0, 0.0, 0.0, 0.0])
+    wrong = 0
+    for _ in range(trials):
+        samples = zip(rng.normal(apart, 0.4, (9, 4)).T, rng.normal(0.0, 0.4, (15, 4)).T, strict=True)
+        tests = [compare_means(a, b, 1.0, alpha=0.0125, equivalence_alpha=0.05) for a, b in samples]
+        wrong += all(test.equivalent for test in tests)
+    assert wrong / trials < 0.05 + 3.0 * math.sqrt(0.05 * 0.95 / trials)  # three standard errors
+    assert wrong / trials > 0.025  # a level shared by four would give .0125 and see less
+
+
+def test_the_level_of_equivalence_is_the_other_unless_it_is_given() -> None:
+    own, given = compare_means(A, B, 1.0, alpha=0.01), compare_means(A, B, 1.0, equivalence_alpha=0.01)
+    assert own.smallest_margin == given.smallest_margin
+    assert own.interval != given.interval
+    with pytest.raises(DesignError, match="equivalence must be below 0.5, got 0.6"):
+        compare_means(A, B, 1.0, equivalence_alpha=0.6)
