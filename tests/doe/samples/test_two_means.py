@@ -78,5 +78,5 @@ def test_the_level_of_equivalence_is_the_other_unless_it_is_given() -> None:
     own, given = compare_means(A, B, 1.0, alpha=0.01), compare_means(A, B, 1.0, equivalence_alpha=0.01)
     assert own.smallest_margin == given.smallest_margin
     assert own.interval != given.interval
-    with pytest.raises(DesignError, match="equivalence must be below 0.5, got 0.6"):
+    with pytest.raises(DesignError, match=r"equivalence must be below 0\.5, got 0\.6"):
         compare_means(A, B, 1.0, equivalence_alpha=0.6)
