@@ -118,7 +118,7 @@ def compare_means(
     alpha : float
         Level of the tests; 1 - alpha is that of the interval. With a margin below .5.
     equivalence_alpha : float, optional
-        Level of the test of equivalence, below .5. Default: alpha. Several comparisons of which *all* must show
+        Level of the test of equivalence, below .5. Default: alpha. Several comparisons that *all* must show
         equivalence need no smaller one: together they hold it (Berger, *Technometrics* 24 (1982) 295).
 
     Raises
@@ -132,7 +132,8 @@ def compare_means(
         margin = checked_number("an equivalence margin", margin)
         if not margin > 0.0:
             raise DesignError(f"an equivalence margin must be positive, got {margin:g}")
-    equivalence_alpha = checked_level(checked_level(alpha) if equivalence_alpha is None else equivalence_alpha)
+    level = checked_level(alpha)
+    equivalence_alpha = level if equivalence_alpha is None else checked_level(equivalence_alpha)
     if equivalence_alpha >= 0.5 and margin is not None:
         raise DesignError(f"alpha of a test of equivalence must be below 0.5, got {equivalence_alpha}")
     first = Sample.of(a)
@@ -152,7 +153,7 @@ def compare_means(
         raise DesignError("no test without spread: every value of the samples is the same")
     known = second.mean if isinstance(second, Sample) else second
     difference = first.mean - known
-    return Comparison(first, second, method, difference, se, df, float(alpha), margin, equivalence_alpha)
+    return Comparison(first, second, method, difference, se, df, level, margin, equivalence_alpha)
 
 
 def _difference_error(a: Sample, b: Sample | float, method: str) -> tuple[float, float]:
