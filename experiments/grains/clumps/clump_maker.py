@@ -105,8 +105,8 @@ def make_clump(request: ClumpRequest, watch: Callable[[Trial], None] = lambda tr
     """Read a clump from a file of spheres, or fit one to a solid."""
     source, unit = request.source, request.unit
     path, named = Path(source), ":" in source and not Path(source).is_file()
-    if not named and not path.exists():
-        raise InputError(source, "no such file")
+    if not named and not path.is_file():
+        raise InputError(source, "is a folder" if path.is_dir() else "no such file")
     wanted = [each for each in (request.sphere_count, request.tolerance) if each is not None]
     given = not named and _holds_spheres(path, bool(wanted))
     if given and wanted:

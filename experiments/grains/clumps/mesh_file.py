@@ -18,12 +18,6 @@ if TYPE_CHECKING:
 
 WELDED = 1e-6
 """Distance of corners that are one, over the mesh's length: single precision of files is 1e-7."""
-CHECKED = 300
-"""Faces whose two sides are checked for a surface that crosses itself."""
-SIDE = 1e-5
-"""Distance of the checked points from their face, over the mesh's length."""
-AT_ONCE = 1_000_000
-"""Solid angles that are computed at once."""
 
 Corners = NDArray[np.float64]
 Faces = NDArray[np.intp]
@@ -36,13 +30,14 @@ def read_surface(path: Path, unit: float) -> Trimesh:
     wrong with the surface, or `ValueError` of `read_mesh`.
     """
     try:
-        mesh = read_mesh(path, unit)
+        with np.errstate(invalid="ignore"):  # the centre of an empty volume
+            mesh = read_mesh(path, unit)
     except ValueError:
         corners, faces = _loaded(path)
         if faces is None:
             raise
         mesh = _closed(path, *_cleaned(corners, faces), unit)
-    if mesh.body_count == 1 and _crosses_itself(np.asarray(mesh.triangles)):
+    if mesh.body_count == 1 and _crosses_itself(mesh):
         problem = "the surface crosses itself"
         hint = "Unite its parts in a mesh program (in Blender: Remesh; in MeshLab: Mesh Boolean)."
         raise InputError(str(path), problem, hint=hint)
@@ -66,11 +61,13 @@ def _loaded(path: Path) -> tuple[Corners, Faces | None]:
     corners = np.asarray(getattr(mesh, "vertices", []), dtype=np.float64).reshape(-1, 3)
     faces = np.asarray(getattr(mesh, "faces", []), dtype=np.intp).reshape(-1, 3)
     if not len(corners):
-        raise InputError(str(path), "has no triangles: it is not a mesh, or an empty one")
+        raise InputError(str(path), "has no triangles: it is no mesh, empty, or cut off")
     if not len(faces):
         hint = "Make a surface of it, in MeshLab by Screened Poisson reconstruction."
         raise InputError(str(path), "a cloud of points, not a surface", f"{len(corners)} points", hint)
-    return corners, faces if len(faces) and np.isfinite(corners).all() else None
+    if not np.isfinite(corners).all():
+        raise InputError(str(path), "a corner has a place that is not a finite number")
+    return corners, faces
 
 
 def _cleaned(corners: Corners, faces: Faces) -> tuple[Corners, Faces]:
@@ -102,6 +99,16 @@ def _edges(faces: Faces) -> tuple[Faces, Faces]:
     return np.unique(pairs, axis=0, return_counts=True)
 
 
+def _places(corners: Corners, edges: Faces) -> tuple[int, Faces, Corners]:
+    """Return the number of groups of connected edges, the group of each, and its ends."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_array((np.ones(len(edges)), edges.T), shape=(len(corners), len(corners)))
+    groups, own = np.unique(connected_components(links, directed=False)[1][edges[:, 0]], return_inverse=True)
+    return len(groups), own, corners[edges]
+
+
 def _closed(path: Path, corners: Corners, faces: Faces, unit: float) -> Trimesh:
     """Build a closed surface; raise `InputError` with its open edges."""
     edges, counts = _edges(faces)
@@ -110,11 +117,12 @@ def _closed(path: Path, corners: Corners, faces: Faces, unit: float) -> Trimesh:
         (counts == 1, "is open", "open edges", "Close the hole in a mesh program (in MeshLab: Close Holes)."),
     ):
         if wrong.any():
-            ends = corners[edges[wrong]]
+            places, own, ends = _places(corners, edges[wrong])
             length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
-            x, y, z = ends.mean(axis=(0, 1))
+            x, y, z = ends[own == np.bincount(own).argmax()].mean(axis=(0, 1))
+            at = "around" if places == 1 else f"at {places} places, most of them around"
             found = (
-                f"{int(wrong.sum())} {name} around ({x:.4g}, {y:.4g}, {z:.4g}), {length:.4g} long in all, "
+                f"{int(wrong.sum())} {name} {at} ({x:.4g}, {y:.4g}, {z:.4g}), {length:.4g} long in all, "
                 "in the file's unit"
             )
             raise InputError(str(path), f"the surface {finding}", found, hint)
@@ -127,34 +135,18 @@ def _closed(path: Path, corners: Corners, faces: Faces, unit: float) -> Trimesh:
         return read_mesh(copy, unit * size)
 
 
-def _crosses_itself(triangles: Corners) -> bool:
-    """Return whether a side of a face is inside where it must be outside, or twice inside.
+def _crosses_itself(mesh: Trimesh) -> bool:
+    """Return whether an edge passes through a face that has none of its corners."""
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkIdList, vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
 
-    The winding number of a closed surface is 1 inside and 0 outside (Jacobson and others, 2013,
-    doi:10.1145/2461912.2461916).
-    """
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    chosen = np.unique(np.linspace(0, len(triangles) - 1, CHECKED).astype(int))
-    chosen = chosen[areas[chosen] > 0.0]
-    step = SIDE * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
-    middles = triangles[chosen].mean(axis=1)
-    away = step * normals[chosen] / areas[chosen, None]
-    outside, inside = (_winding(middles + side * away, triangles) for side in (1.0, -1.0))
-    return bool((np.abs(outside) > 0.5).any() or (np.abs(inside - 1.0) > 0.5).any())
-
-
-def _winding(points: Corners, triangles: Corners) -> Corners:
-    """Winding numbers of a surface about points (van Oosterom and Strackee, 1983)."""
-    parts = np.array_split(points, max(1, len(points) * len(triangles) // AT_ONCE))
-    return np.concatenate([_solid_angles(part, triangles) for part in parts]) / (4.0 * np.pi)
-
-
-def _solid_angles(points: Corners, triangles: Corners) -> Corners:
-    a, b, c = (triangles[None, :, corner] - points[:, None] for corner in range(3))
-    x, y, z = (np.linalg.norm(each, axis=2) for each in (a, b, c))
-    across = np.einsum("ijk,ijk->ij", a, np.cross(b, c))
-    along = x * y * z + sum(
-        np.einsum("ijk,ijk->ij", one, other) * size for one, other, size in ((a, b, z), (b, c, x), (c, a, y))
-    )
-    return np.asarray(2.0 * np.arctan2(across, along).sum(axis=1))
+    tree, places, met = vtkStaticCellLocator(), vtkPoints(), vtkIdList()
+    tree.SetDataSet(pyvista.wrap(mesh))
+    tree.BuildLocator()
+    faces, corners = [set(face) for face in mesh.faces.tolist()], np.asarray(mesh.vertices).tolist()
+    for one, other in mesh.edges_unique.tolist():
+        tree.IntersectWithLine(corners[one], corners[other], 0.0, places, met)
+        if any(faces[met.GetId(n)].isdisjoint((one, other)) for n in range(met.GetNumberOfIds())):
+            return True
+    return False

@@ -49,15 +49,26 @@ def test_an_open_surface_says_how_many_edges_where_and_how_long(tmp_path: Path) 
         read_surface(path, 1e-3)
     said = f"is open, got 3 open edges around ({x:.4g}, {y:.4g}, {z:.4g}), {length:.4g} long in all"
     assert said in str(refusal.value)
+    whole = CORNERS[FACES].mean(axis=1)[:, 2]
+    ends = FACES[
+        [whole.argmin(), whole.argmax()]
+    ]  # two holes, far from one another: the place is one of them
+    path = obj(tmp_path / "holes.obj", CORNERS, np.delete(FACES, [whole.argmin(), whole.argmax()], axis=0))
+    with pytest.raises(InputError, match="6 open edges at 2 places, most of them around") as refusal:
+        read_surface(path, 1e-3)
+    assert any(
+        "({:.4g}, {:.4g}, {:.4g})".format(*CORNERS[face].mean(axis=0)) in str(refusal.value) for face in ends
+    )
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0])
 def test_a_surface_that_crosses_itself_is_refused_and_thin_and_hollow_ones_are_not(
     tmp_path: Path, unit: float
 ) -> None:
-    pushed = CORNERS - [0.0, 0.0, 6.0] * (CORNERS[:, 2:] > 1.8)  # the top through the bottom
-    with pytest.raises(InputError, match="crosses itself"):
-        read_surface(obj(tmp_path / "crossing.obj", pushed, FACES), unit)
+    top, one = CORNERS[:, 2:] > 1.8, CORNERS[:, 2:] == CORNERS[:, 2].max()  # pushed through the bottom
+    for pushed in (top, one):
+        with pytest.raises(InputError, match="crosses itself"):
+            read_surface(obj(tmp_path / "crossing.obj", CORNERS - [0.0, 0.0, 6.0] * pushed, FACES), unit)
     dented = CORNERS * [1.0, 1.0, 1.0] - [0.0, 0.0, 3.0] * (CORNERS[:, 2:] > 1.8)
     for name, corners in (("dented.obj", dented), ("thin.obj", CORNERS * [1.0, 1.0, 0.02])):
         assert read_surface(obj(tmp_path / name, corners, FACES), unit).volume > 0.0
@@ -68,6 +79,7 @@ def test_a_surface_that_crosses_itself_is_refused_and_thin_and_hollow_ones_are_n
     [
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "a cloud of points, not a surface, got 3 points"),
         ("a.stl", "hello\n", "has no triangles"),
+        ("a.off", "OFF\n3 1 0\nnan 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "not a finite number"),
         ("a.step", "ISO-10303-21;\n", "Export the shape as STL"),
     ],
 )
