@@ -59,6 +59,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     else:
         (point, rule), region = choose_jointly(joint, settings), joint.region()
     prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
+    prediction["full_mean"] = full_mean(prediction)
     ranges = ranges_of(region, joint, study.limits)
     unidentified = _unidentified(settings, region, ranges)
     truth = (
@@ -69,7 +70,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     numbers = numbered_values("chosen", point)
     numbers |= {key_of("prediction", response): prediction["mean"]}
     if fit.dropped:
-        numbers |= {key_of("prediction of the full model", response): full_mean(prediction)}
+        numbers |= {key_of("prediction of the full model", response): prediction["full_mean"]}
     numbers |= {key_of("se of the fit", response): prediction["se"]}
     decisions = [
         Decision(
@@ -86,7 +87,9 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     if checks:
         decisions.append(direct_decision(checks))
     if truth is not None:
-        decisions.append(_truth_decision(truth, sample.mean, response))
+        decisions.append(
+            _truth_decision(truth, sample.mean, response, "reduced surface" if fit.dropped else "surface")
+        )
     return OptimumResult(
         point=point,
         settings=middle(study.factors, point),
@@ -222,7 +225,8 @@ def _region_decision(
 ) -> Decision:
     numbers = {"share of the region": region.fraction, "extent, coded": region.extent}
     for name, ends in ranges.iterrows():
-        numbers |= {f"low of {name}": ends["low"], f"high of {name}": ends["high"]}
+        for end in ("low", "high"):
+            numbers[f"{end} of {name}" + ", not explored beyond" * bool(ends[f"{end}_open"])] = ends[end]
     outcome = f"{region.fraction:.0%} of the design region is compatible with the target."
     if len(region.factors) > 1 and joint is None:
         outcome += " The target is one equation: the factors trade off along its contour."
@@ -247,7 +251,7 @@ def _region_decision(
     )
 
 
-def _truth_decision(truth: TruthCheck, target: float, response: Response) -> Decision:
+def _truth_decision(truth: TruthCheck, target: float, response: Response, model: str) -> Decision:
     verdict = {
         True: "The hidden truth lies in the compatible region: recovered as far as the target can tell.",
         False: "The hidden truth lies outside the compatible region: it was not recovered.",
@@ -262,6 +266,6 @@ def _truth_decision(truth: TruthCheck, target: float, response: Response) -> Dec
         numbered_values("hidden", truth.values)
         | {"distance to the contour, coded": truth.distance}
         | {key_of("prediction at the truth", response): truth.predicted, key_of("target", response): target},
-        f"{verdict} {distance}; the surface predicts "
+        f"{verdict} {distance}; the {model} predicts "
         f"{quantity(truth.predicted, response.unit)} there, the target is {quantity(target, response.unit)}.",
     )

@@ -296,7 +296,7 @@ class OptimumResult(StageResult):
     settings: dict[str, float]
     """The same with every other factor at its middle: what a case needs."""
     prediction: pd.Series
-    """Fit of the leading response there: mean, se, intervals, named as by ``Surface.predict``."""
+    """Fit of the leading response there, as of ``Surface.predict``, and ``full_mean`` of the full model."""
     extent: float
     """Coded half width of the box that contour and region are drawn in: the reach of the axial points."""
     contour: pd.DataFrame

@@ -278,6 +278,13 @@ CASES: Mapping[str, Brought] = {
     "a WebP": Brought("a.webp", saved("WEBP"), command=FAR),
     "a web page called JPEG": Brought("a.jpg", lambda: "<html>404 Not Found</html>", ("is a web page",)),
     "half a JPEG": Brought("a.jpg", lambda: saved("JPEG")()[:5000], ("damaged or cut off",)),
+    "an empty picture": Brought("a.jpg", lambda: "", ("is empty",)),
+    "a data file of LAMMPS": Brought(
+        "a.data", lambda: "LAMMPS data file via write_data\n\n3 atoms\n", ("data file",)
+    ),
+    "a MAT-file": Brought(
+        "a.mat", lambda: b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(99), ("not a picture",)
+    ),
     "a video": Brought("a.mp4", lambda: b"\0\0\0\x18ftypmp42" + bytes(999), ("is a video", "Save one frame")),
     "a PDF": Brought("a.pdf", lambda: b"%PDF-1.5\n\xff\xfe" + bytes(999), ("is a PDF", "Save its picture")),
     # studies

@@ -17,7 +17,9 @@ from experiments.io.units import Quantity
 ROUNDING = 0.5
 """Largest deviation of a sum of rounded percentages from 100 [%]."""
 
-SIEVE_COLUMNS = ("opening", "retained", "retained_percent", "passing_percent", "cumulative_retained_percent")
+SIEVE_COLUMNS = (
+    "opening", "number", "retained", "retained_percent", "passing_percent", "cumulative_retained_percent",
+)  # fmt: skip
 COUNT_COLUMNS = ("diameter", "from", "to", "count")
 PANS, SUMS = ("pan", "receiver", "tray", "bottom", "base", "fines"), ("total", "sum")
 """Openings in words: none at all, and rows that are no sieves."""
@@ -38,16 +40,16 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
 
     Columns: ``opening``, and one of ``retained`` (mass on the sieve), ``retained_percent``,
     ``passing_percent`` and ``cumulative_retained_percent``, or what sheets call them (see `_sieve_column`);
-    of several the first in this order counts. The opening of a pan is 0 or in words; ``#40`` and ``40 mesh``
-    are sieves of ASTM E11. ``unit`` is that of openings without one. Return the distribution by mass between
-    the finest and the coarsest opening, and the part of the mass beyond them.
+    of several the first in this order counts. The opening of a pan is 0 or in words, here or as its
+    ``number``; ``#40`` and ``40 mesh`` are of ASTM E11. ``unit`` is that of openings without one. Return the
+    distribution by mass between the finest and the coarsest opening, and the part of the mass beyond them.
     """
     header = UnitHeader(_sieve_column)
     found = list(read_rows(path, ("opening",), SIEVE_COLUMNS, header))
-    column = _one_of(path, found, SIEVE_COLUMNS[1:])
+    column = _one_of(path, found, SIEVE_COLUMNS[2:])
     _at_least(path, found, 2)
     unit = header.units.get("opening") or unit
-    sieves = [(_opening(row, unit), row) for row in found if row["opening"].lower() not in SUMS]
+    sieves = [(_opening(row, unit), row) for row in found if _name(row) not in SUMS]
     openings, rows = zip(*sorted(sieves, key=lambda sieve: sieve[0]), strict=True)
     for row, (finer, coarser) in zip(rows[1:], pairwise(openings), strict=True):
         if not coarser > finer:
@@ -88,6 +90,8 @@ class UnitHeader:
             names.append("" if name in names else name)
             if name and unit and name == names[-1]:
                 self.units[name] = unit
+        if "number" in names and "opening" not in names:
+            names[names.index("number")], self.units["opening"] = "opening", "mesh"
         return names
 
 
@@ -96,6 +100,8 @@ def _sieve_column(name: str, unit: str) -> str:
     letters, share = re.sub(r"[^a-z]", "", name.lower()), "%" in name + unit or "percent" in name.lower()
     if name in SIEVE_COLUMNS:
         return name
+    if letters in ("mesh", "meshno", "meshnumber", "sieveno", "sievenumber"):
+        return "number"
     if re.search("opening|aperture|size|diameter", letters) or letters == "sieve":
         return "opening"
     if re.search("passing|finer|undersize", letters) and (share or not unit):
@@ -106,10 +112,14 @@ def _sieve_column(name: str, unit: str) -> str:
     return "retained" if alone else ""
 
 
+def _name(row: Row) -> str:
+    return (row["opening"] or row["number"]).lower()
+
+
 def _opening(row: Row, unit: str | None) -> float:
     """Read an opening [m]: 0 for a pan, or for what is finer than a sieve; also by the number of a mesh."""
-    word = row["opening"].lower()
-    if mesh := _MESH.fullmatch(f"{word} mesh" if unit == "mesh" else word):
+    word = _name(row)
+    if mesh := _MESH.fullmatch(word) or (_MESH.fullmatch(f"{word} mesh") if unit == "mesh" else None):
         number = mesh[1] or mesh[2]
         if number not in _MESHES:
             raise row.error(
@@ -129,20 +139,20 @@ def read_counts(path: Path, unit: str | None = None, column: str | None = None) 
 
     def named(name: str, _: str) -> str:
         if column is not None:
-            return "diameter" if name.lower() == _UNIT.sub("", column).strip().lower() else ""
+            return column if name.lower() == _UNIT.sub("", column).strip().lower() else ""
         return name.lower() if name.lower() in COUNT_COLUMNS else name
 
     header = UnitHeader(named)
-    needed = ("diameter",) if column is not None else ()
-    rows = list(read_rows(path, needed, COUNT_COLUMNS, header))
+    diameter, needed = column or "diameter", () if column is None else (column,)
+    rows = list(read_rows(path, needed, (*COUNT_COLUMNS, *needed), header))
     unit = next(iter(header.units.values()), None) or unit
     _at_least(path, rows, 1)
-    if "diameter" in rows[0].cells:
+    if diameter in rows[0].cells:
         if both := [name for name in ("from", "to") if name in rows[0].cells]:
             problem = "must have a column diameter, or from, to and count, not both"
             raise InputError(str(path), problem, f"diameter and {', '.join(both)}")
-        found = [(_length(row, "diameter", unit), _count(row)) for row in rows]
-        between = [(diameter, diameter, share) for diameter, share in sorted(found)]
+        found = [(_length(row, diameter, unit), _count(row)) for row in rows]
+        between = [(size, size, share) for size, share in sorted(found)]
     else:
         if missing := [name for name in ("from", "to", "count") if name not in rows[0].cells]:
             problem = f"needs a column diameter, or from, to and count; missing: {', '.join(missing)}"

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.grains.spheres.sphere_file import Columns, Format, SphereFile, spheres_of
+from experiments.grains.spheres.sphere_file import TYPES, Columns, Format, SphereFile, spheres_of
 from experiments.io.errors import InputError
 
 PLACES = ("x", "xu", "xs", "xsu")
@@ -143,7 +143,7 @@ def _columns(names: list[str], place: str) -> tuple[Columns, bool]:
         raise InputError(place, problem, " ".join(names) or "no columns", hint)
     x, y, z = (names.index(axis + start[1:]) for axis in "xyz")
     body = next((names.index(name) for name in BODIES if name in names), None)
-    types = names.index("type") if "type" in names else None
+    types = next((names.index(name) for name in TYPES if name in names), None)
     is_diameter = size.rpartition("_")[2].startswith("d")
     return Columns(x, y, z, names.index(size), is_diameter, body, types), start in ("xs", "xsu")
 

@@ -48,14 +48,10 @@ _BINARY = ("a binary dump of LAMMPS or LIGGGHTS", "Write a text dump: a name tha
 _VIDEO = ("a video", "Save one frame as PNG or JPEG.")
 _PACKED = ("a compressed file", "Decompress it, or compress it by gzip.")
 OTHERS = {
-    "LAMMPSCUSTOM": (
-        "a binary dump of LAMMPS or LIGGGHTS",
-        "Write a text dump: a name that does not end in .bin.",
-    ),
-    "DUMPCUSTOM": (
-        "a binary dump of LAMMPS or LIGGGHTS",
-        "Write a text dump: a name that does not end in .bin.",
-    ),
+    "LAMMPSCUSTOM": _BINARY,
+    "DUMPCUSTOM": _BINARY,
+    "LammpS RestartT": ("a restart file of LAMMPS or LIGGGHTS", _CUSTOM),
+    "LAMMPS data file": ("a data file of LAMMPS", _CUSTOM),
     "Atoms. Timestep": ("an XYZ dump of LAMMPS or LIGGGHTS, without radii", _CUSTOM),
     "Number of particles =": ("an AtomEye configuration (cfg)", _CUSTOM),
     "\x89HDF": ("an HDF5 file", "Export centres and radii as VTK or CSV."),
@@ -64,6 +60,7 @@ OTHERS = {
     "\x28\xb5\x2f\xfd": _PACKED,
     "\xfd7zXZ": _PACKED,
     "7z\xbc\xaf": _PACKED,
+    "Rar!": _PACKED,
     "%PDF": ("a PDF", "Save its picture as PNG or JPEG."),
     "PK\x03\x04": (
         "a ZIP archive or an Office document",
@@ -119,6 +116,8 @@ def format_of(path: Path) -> Format | None:
 def require_known(path: Path) -> None:
     """Raise InputError with the name of a format that is neither a picture's nor one of `FORMATS`."""
     start = head_of(path)[:32] if path.is_file() else ""
+    if path.is_file() and path.stat().st_size == 0:
+        raise InputError(str(path), "is empty")
     for mark, (name, hint) in OTHERS.items():
         if mark in start:
             raise InputError(str(path), f"is {name}, neither a picture nor a file of spheres", hint=hint)
@@ -131,8 +130,9 @@ def require_known(path: Path) -> None:
 
 def require_no_text(path: Path) -> None:
     """Raise InputError for a text, which is no picture."""
-    start = " ".join(head_of(path)[:32].split()) if path.is_file() else ""
-    if start and start.isascii() and start.isprintable():
+    head = head_of(path) if path.is_file() else ""
+    start = " ".join(head[:32].split())
+    if start and "\0" not in head and start.isascii() and start.isprintable():
         problem = "is text, neither a picture nor a file of spheres"
         raise InputError(str(path), problem, hint="A table needs columns x, y, z and a radius or a diameter.")
 

@@ -14,7 +14,10 @@ from experiments.io.texts import is_number, number
 
 SPHERE_RULE = "a sphere must be x y z r: four finite numbers, r > 0"
 
-TYPES = ("type", "types", "atomtype", "particletype", "speciestype", "species", "matid", "materialid")
+TYPES = (
+    "type", "types", "atomtype", "particletype", "speciestype", "species", "matid", "materialid", "material",
+    "typelabel", "element",
+)  # fmt: skip
 """Names of a type's column or array, in lower case without marks."""
 LARGEST = 500_000_000
 """Size of the largest file of spheres that is read [bytes]: frames of a heap of millions."""

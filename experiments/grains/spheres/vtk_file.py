@@ -47,7 +47,8 @@ def _read(path: Path) -> SphereFile:
         named = ", ".join(arrays.values()) or "none"
         raise InputError(str(path), f"the points need an array radius (or radii, diameter), not only {named}")
     table = np.column_stack([points, np.ravel(values[size])[: len(points)]]).astype(np.float64)
-    body, kind = (next((name for name in names if name in values), None) for names in (BODIES, TYPES))
+    body = next((name for name in BODIES if name in values), None)
+    kind = next((name for name in values if name.replace("_", "") in TYPES), None)
     further = [np.ravel(values[name])[: len(points)] for name in (body, kind) if name is not None]
     rows = (
         (n, [repr(float(value)) for value in row]) for n, row in enumerate(np.column_stack([table, *further]))

@@ -80,6 +80,7 @@ def test_a_range_that_ends_where_nothing_was_explored_is_open_there() -> None:
     region = optimum.region
     assert "of what was explored: E (low), E (high), F (low), F (high)." in optimum.decisions[1].outcome
     assert region.open_ends.to_numpy().all()
+    assert "high of E, not explored beyond" in optimum.decisions[1].numbers
     # The line E + F = 0 meets the circle of the runs, of radius sqrt(2), at -1 and 1: to two cells of .007
     # and the slant of a band that is ten standard errors wide.
     ends = [[at_coded(-1, 0)["E"], at_coded(1, 0)["E"]]] * 2
@@ -124,6 +125,8 @@ def test_a_target_that_the_surface_misses_within_their_errors_has_its_closest_po
     # Cells of the region are .007 apart, 400 over 2 sqrt(2): 3 x 2 x .007 / 2 degrees. Along the circle the
     # plane falls by the square of the angle, 3 degrees a unit of it: as little within .12.
     assert optimum.prediction["mean"] == pytest.approx(26.0, abs=0.021 + 10 * NOISE)
+    low, middle, high = optimum.prediction[["confidence_low", "full_mean", "confidence_high"]]
+    assert middle == pytest.approx((low + high) / 2.0)
     assert optimum.point == pytest.approx(at_coded(1.0, 1.0), abs=0.12 * HALF_RANGE)
     assert "comes closest" in optimum.decisions[0].rule
     assert optimum.region.mask.any()

@@ -310,6 +310,9 @@ SHEETS = {
     "cumulative": "Size (mm),Cumulative retained (%)\n2,0\n1,30\n0.5,90\nPan,100\n",
     "by numbers": "# of a lecture\nopening,retained_percent\n#10,0\nNo. 18,30\n35 mesh,60\nPan,10\n",
     "numbers alone": "Sieve (mesh),% passing\n10,100\n18,70\n35,10\n",
+    "a column of numbers": "Mesh,Mass retained (g)\n#10,0\n18,30\n35,60\nPan,10\n",
+    "a pan among the numbers": "Sieve No.,Opening (mm),Retained (g)\n10,2,0\n18,1,30\n35,0.5,60\n"
+    "Pan,,10\nTotal,,100\n",
     "a whole sheet": "Sample,river sand\n"
     "Sieve No.,Opening (mm),Mass of sieve (g),Mass retained (g),% retained,% finer\n"
     "10,2,400,0,0,100\n18,1,390,30,30,70\n35,0.5,380,60,60,10\n-,Pan,300,10,10,0\n,Total,,100,100,\n",
@@ -338,7 +341,7 @@ def test_an_analysers_export_has_its_diameter_in_a_named_column(
     mean = load_study(with_sizes(write_study, study)).case({}, seed=1).grains.mixture.shapes[0].radii[0]
     # the grain of the mean mass of one of 1 mm and two of 2 mm, within the classes' width
     assert 2.0 * mean == pytest.approx(1e-3 * (17.0 / 3.0) ** (1.0 / 3.0), rel=0.01)
-    with pytest.raises(InputError, match="missing: diameter"):
+    with pytest.raises(InputError, match="missing: Feret"):
         read_counts(table(tmp_path, export), None, "Feret")
 
 

@@ -170,7 +170,7 @@ TWO = "x y z r\n0 0 0 1\n5 0 0 1\n"
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>", "with a document type", ""),
         ("<a><sphere x='0' y='0' z='0'/></a>", "no spheres", ""),
         ("<a><sphere x='0' y='0' z='0' radius='big'/></a>", "four finite numbers", "sphere 1"),
-        ("", "not a file of spheres", ""),
+        ("", "is empty", ""),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_place(tmp_path: Path, text: str, rule: str, place: str) -> None:

@@ -214,16 +214,18 @@ def test_a_heap_of_one_type_without_a_floor_has_nothing_to_mention() -> None:
         assert "the same" not in row["source"]
 
 
-@pytest.mark.parametrize("name", ["t.csv", "t.xyz", "t.data", "t.npz", "t.vtp", "t.txt"])
+@pytest.mark.parametrize("name", ["t.csv", "t.xyz", "t.data", "t.npz", "t.vtp", "t.txt", "t.dump"])
 def test_types_are_read_from_every_format_that_has_them(name: str, tmp_path: Path) -> None:
     path, types = tmp_path / name, [1, 2, 2]
     spheres = [(0.0, 0.0, 1.0, 0.5, types[0]), (1.0, 0.0, 1.0, 0.5, types[1]), (0.0, 1.0, 1.0, 0.5, types[2])]
     rows = {
-        "t.csv": "x,y,z,radius,type\n" + "".join("{},{},{},{},{}\n".format(*row) for row in spheres),
+        "t.csv": "x,y,z,radius,material\n" + "".join("{},{},{},{},{}\n".format(*row) for row in spheres),
         "t.xyz": "3\nProperties=pos:R:3:radius:R:1:species:S:1\n"
         + "".join("{} {} {} {} {}\n".format(*row) for row in spheres),
         "t.data": "3 0 0 0 0 1 1 1\n"
         + "".join("{} {} {} 0 0 0 {} 0 0 0 0 0 0 {}\n".format(*r) for r in spheres),
+        "t.dump": "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n3\nITEM: ATOMS x y z radius element\n"
+        + "".join("{} {} {} {} {}\n".format(*row) for row in spheres),
         "t.txt": "#format x_y_z_r_matId\n" + "".join("{} {} {} {} {}\n".format(*row) for row in spheres),
     }
     table = np.array(spheres)
@@ -231,7 +233,7 @@ def test_types_are_read_from_every_format_that_has_them(name: str, tmp_path: Pat
         np.savez(path, position=table[:, :3], radius=table[:, 3], type=table[:, 4])
     elif name == "t.vtp":
         cloud = pyvista.PolyData(table[:, :3])
-        cloud["radius"], cloud["type"] = table[:, 3], table[:, 4]
+        cloud["radius"], cloud["Particle_Type"] = table[:, 3], table[:, 4]
         cloud.save(path)
     else:
         path.write_text(rows[name], "utf-8")
