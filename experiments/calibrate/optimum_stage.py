@@ -59,7 +59,8 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     else:
         (point, rule), region = choose_jointly(joint, settings), joint.region()
     prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
-    prediction["full_mean"] = full_mean(prediction)
+    # the full model's intervals are symmetric about its mean
+    prediction["full_mean"] = float(prediction["confidence_low"] + prediction["confidence_high"]) / 2.0
     ranges = ranges_of(region, joint, study.limits)
     unidentified = _unidentified(settings, region, ranges)
     truth = (
@@ -106,18 +107,13 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     )
 
 
-def full_mean(prediction: pd.Series) -> float:
-    """Return what the full model predicts: the middle of its interval, as ``Surface.predict`` has it."""
-    return float(prediction["confidence_low"] + prediction["confidence_high"]) / 2.0
-
-
 def _predicted(found: FittedResponse, prediction: pd.Series, response: Response) -> str:
     """Write what the surface predicts, with the model that each number comes from."""
     unit, mean = response.unit, quantity(prediction["mean"], response.unit)
     interval = interval_text((prediction["confidence_low"], prediction["confidence_high"]), unit)
     if not found.final.dropped:
         return f"surface of the {response.name} predicts {mean} ({interval})"
-    full = f"the full one, whose errors count, {quantity(full_mean(prediction), unit)} ({interval})"
+    full = f"the full one, whose errors count, {quantity(prediction['full_mean'], unit)} ({interval})"
     return f"reduced surface of the {response.name} predicts {mean}; {full}"
 
 

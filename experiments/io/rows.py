@@ -11,7 +11,7 @@ from pathlib import Path
 
 from experiments.io import excel_files
 from experiments.io.errors import InputError
-from experiments.io.texts import nearest_name, read_text
+from experiments.io.texts import is_number, nearest_name, read_text
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,15 @@ def read_rows(
 
     The first row names the columns: all that are needed, and any of the known ones. With `renamed`, which
     returns known names and empty ones for columns to ignore, it is the first row with all needed columns.
+    A line of one cell above a row of several names is a title.
     Raise InputError when the file cannot be read, its columns are not these, or a row has more cells than
     columns.
     """
     header: list[str] = []
     lines = list(_lines(path, numbered=renamed is not None))
+    names = [cell for cell in lines[1][1] if cell and not is_number(cell)] if len(lines) > 1 else []
+    if sum(map(bool, lines[0][1] if lines else [])) == 1 < len(names):
+        del lines[0]
     heads = (renamed(cells) for _, cells in lines) if renamed else iter(())
     found = next((names for names in heads if set(needed) <= set(names)), None)
     for line, cells in lines:

@@ -56,24 +56,14 @@ OTHERS = {
     "Number of particles =": ("an AtomEye configuration (cfg)", _CUSTOM),
     "\x89HDF": ("an HDF5 file", "Export centres and radii as VTK or CSV."),
     "CDF": ("a NetCDF file", "Export centres and radii as VTK or CSV."),
-    "BZh": _PACKED,
-    "\x28\xb5\x2f\xfd": _PACKED,
-    "\xfd7zXZ": _PACKED,
-    "7z\xbc\xaf": _PACKED,
-    "Rar!": _PACKED,
+    **dict.fromkeys(("BZh", "\x28\xb5\x2f\xfd", "\xfd7zXZ", "7z\xbc\xaf", "Rar!"), _PACKED),
     "%PDF": ("a PDF", "Save its picture as PNG or JPEG."),
     "PK\x03\x04": (
         "a ZIP archive or an Office document",
         "Take the file out of it, or save the sheet as CSV.",
     ),
-    "ftypisom": _VIDEO,
-    "ftypmp4": _VIDEO,
-    "ftypqt": _VIDEO,
-    "ftypM4V": _VIDEO,
-    "ftyp3g": _VIDEO,
-    "AVI LIST": _VIDEO,
-    "\0\0\1\xba": _VIDEO,
-    "\x1aE\xdf\xa3": _VIDEO,
+    **dict.fromkeys(("ftypisom", "ftypmp4", "ftypqt", "ftypM4V", "ftyp3g", "AVI LIST"), _VIDEO),
+    **dict.fromkeys(("\0\0\1\xba", "\x1aE\xdf\xa3"), _VIDEO),
 }
 """Names of other formats, with a hint, by a mark in their first 32 bytes."""
 

@@ -185,6 +185,14 @@ def test_columns_of_other_programs_are_not_factors() -> None:
     )
 
 
+def test_a_title_above_the_names_changes_nothing() -> None:
+    text = "A (mm),B,angle\n1,0,11\n2,0,12\n1,1,13\n2,1,14.2\n"
+    Path("runs.csv").write_text(text, encoding="utf-8")
+    Path("titled.csv").write_text(f"Series 3 of March\n\n{text}", encoding="utf-8")
+    plain, titled = (answered("fit", name, "--model", "first-order") for name in ("runs.csv", "titled.csv"))
+    pd.testing.assert_frame_equal(plain["coefficients"], titled["coefficients"])
+
+
 @pytest.mark.parametrize(
     ("text", "words", "message"),
     [
