@@ -68,8 +68,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
         if target.truth is None
         else _check_truth(fit, target, settings.confidence, (reach, radius), joint)
     )
-    numbers = numbered_values("chosen", point)
-    numbers |= {key_of("prediction", response): prediction["mean"]}
+    numbers = numbered_values("chosen", point) | {key_of("prediction", response): prediction["mean"]}
     if fit.dropped:
         numbers |= {key_of("prediction of the full model", response): prediction["full_mean"]}
     numbers |= {key_of("se of the fit", response): prediction["se"]}
