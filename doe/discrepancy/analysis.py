@@ -39,13 +39,7 @@ from doe.discrepancy.verdict.conclusion import (
     objections,
     withdrawn,
 )
-from doe.discrepancy.verdict.discovery import (
-    Confounding,
-    Discovery,
-    Effort,
-    Gap,
-    Verdict,
-)
+from doe.discrepancy.verdict.discovery import Confounding, Discovery, Effort, Gap, Verdict
 from doe.discrepancy.verdict.next_experiment import NextExperiment, propose
 from doe.numerics.one_thread import in_one_thread, steps_in_one_thread
 

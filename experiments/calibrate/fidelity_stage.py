@@ -9,13 +9,7 @@ import pandas as pd
 
 from doe import DesignError, Sample, Surface, TargetError, Transfer, spread_points, transfer
 from experiments.calibrate.cases import Runner, failure_summary, measured, plan_cases, too_many_failed
-from experiments.calibrate.results import (
-    ClimbResult,
-    Decision,
-    FidelityResult,
-    SurfaceResult,
-    TargetResult,
-)
+from experiments.calibrate.results import ClimbResult, Decision, FidelityResult, SurfaceResult, TargetResult
 from experiments.calibrate.values import interval_text, key_of, quantity
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import FidelitySettings, Response

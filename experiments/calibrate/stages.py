@@ -224,11 +224,11 @@ def _verdict(study: Study, optimum: OptimumResult, verification: VerificationRes
         [f"{r.name} within {quantity(test.margin or 0.0, r.unit)}" for r, test in tests if equal(test)]
         for equal in (lambda test: test.equivalent, lambda test: not test.equivalent)
     )
-    said = [f"equivalence is shown for {', '.join(shown)}"] if shown else []
+    said = f"; equivalence is shown for {', '.join(shown)}" if shown else ""
     as_good = f"{optimum.region.fraction:.0%} of the settings that the surface covers are compatible with it."
     if optimum.pins_nothing:
         as_good += " None of the values is pinned down."
     if verification.verified:
-        return Outcome.CALIBRATED, f"{found}; {'; '.join(said)}. {as_good}"
-    said += [f"equivalence is not shown for {', '.join(unproven)}: add replicates"]
-    return Outcome.UNDECIDED, f"{found}: no difference is found, but {'; '.join(said)}. {as_good}"
+        return Outcome.CALIBRATED, f"{found}{said}. {as_good}"
+    said += f"{', but not' if shown else ', but equivalence is not shown'} for {', '.join(unproven)}"
+    return Outcome.UNDECIDED, f"{found}: no difference is found{said}: add replicates. {as_good}"

@@ -102,6 +102,6 @@ def _print_heap(simulated: Heap, folder: Path, as_json: bool) -> None:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
     messages.print(f"Files: {folder}")
     if simulated.reason:
-        fail(f"the case {simulated.result.status}: {simulated.reason}", FAILED_RUN)
+        fail(f"the case ended as {simulated.result.status}: {simulated.reason}", FAILED_RUN)
     elif not as_json:
         print_measured(simulated)

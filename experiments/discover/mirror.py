@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dem_warp import Case
 from experiments.studyfile import Study
 
 
@@ -14,13 +13,9 @@ def odd_observables(study: Study) -> tuple[str, ...]:
     ends = [{}, *({factor.name: end} for factor in study.factors for end in (factor.low, factor.high))]
     under = [study.under(condition.name) for condition in study.conditions]
     cases = [each.case(_open(each, settings), seed=0) for each in under for settings in ends]
-    if any(_leans(case) for case in cases):
+    if any(getattr(case.scene, "tilt", 0.0) for case in cases):
         return ()
     return tuple(each.name for each in study.measurable if each.directed)
-
-
-def _leans(case: Case) -> bool:
-    return bool(getattr(case.scene, "tilt", 0.0))
 
 
 def _open(study: Study, settings: dict[str, float]) -> dict[str, float]:

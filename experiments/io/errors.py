@@ -34,7 +34,11 @@ class Problem:
     """Advice, as a sentence."""
 
     def __str__(self) -> str:
-        got = f", got {shortened(self.value)}" if self.value else ""
+        got = (
+            f"{' Got' if self.problem.endswith('?') else ', got'} {shortened(self.value)}"
+            if self.value
+            else ""
+        )
         hint = f". {self.hint}" if self.hint else ""
         return f"{self.place}: {shortened(self.problem, LONGEST_PROBLEM)}{got}{hint}"
 

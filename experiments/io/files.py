@@ -9,6 +9,7 @@ import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 from experiments.io.errors import InputError
@@ -113,6 +114,14 @@ def read_file(path: Path, largest: int) -> bytes:
     check_file(path, largest)
     with path.open("rb") as file:
         return file.read(largest)
+
+
+def check_lines(path: Path, most: int, hint: str) -> None:
+    """Refuse a text of more lines than `most`; no part of it is kept."""
+    with path.open("rb") as file:
+        lines = sum(part.count(b"\n") for part in iter(partial(file.read, 1 << 20), b""))
+    if lines > most:
+        raise InputError(str(path), f"must have at most {most:,} lines", f"{lines:,}", hint)
 
 
 def existing(path: Path) -> Path:

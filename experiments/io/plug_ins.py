@@ -93,6 +93,17 @@ def calling(thing: object, place: str) -> Iterator[None]:
         raise InputError(place, f"{made} raised {described(error)}") from error
 
 
+def skipped_for(entry: str) -> str:
+    """Return why an entry of a `PlugIn` cannot be loaded, or that it can."""
+    kind, _, name = entry.partition(": ")
+    try:
+        for found in entry_points(group=f"dem_warp.{kind}", name=name):
+            found.load()
+    except Exception as error:
+        return described(error)
+    return "it breaks a rule of its kind"
+
+
 def described(error: BaseException) -> str:
     """Describe an error in one line, with the package, the file and the line of a plug-in that raised it."""
     text, place = f"{type(error).__name__}: {error}", fault_of(error)

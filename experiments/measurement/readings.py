@@ -16,12 +16,7 @@ from experiments.io.texts import nearest_name
 from experiments.io.units import Quantity
 from experiments.measurement.profile_files import read_pixel, read_profiles
 from experiments.measurement.value_limits import ValueLimits
-from experiments.studyfile.observables import (
-    DIMENSIONS,
-    PROFILES,
-    Observable,
-    View,
-)
+from experiments.studyfile.observables import DIMENSIONS, PROFILES, Observable, View
 from imaging import FITS
 
 if TYPE_CHECKING:

@@ -102,7 +102,7 @@ def simulated_sentences(study: Study) -> Iterator[str]:
     """Say what was simulated, and how its heaps were measured."""
     facts, density = study_facts(study), str(study.document["grain"].get("density", "as in the study"))
     test = facts.get("Test", f"a lifted cylinder ({facts.get('Tube')}; lifted at {facts.get('Lift')})")
-    yield say("methods.test", test=test, grains=facts["Grains"], density=_units(density))
+    yield say("methods.test", test=test, grains=facts["Grains"], density=density.replace("^3", "³"))
     modulus = facts["Shear modulus"]
     softened = "was not softened" if modulus == "real" else f"was {modulus}"
     laws = "Hertz and Mindlin's law without slip, with EDEM's damping and rolling friction"
@@ -172,10 +172,6 @@ def _verification(campaign: Campaign, study: Study) -> Iterator[str]:
             margin=quantity(test.margin, unit),
             p_equivalence=p_clause(test.equivalence_p),
         )
-
-
-def _units(text: str) -> str:
-    return text.replace("^2", "²").replace("^3", "³")
 
 
 def _sample(sample: Any, response: Response | Direct) -> str:

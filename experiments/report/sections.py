@@ -11,7 +11,6 @@ from experiments.calibrate.fidelity_stage import FidelityResult
 from experiments.calibrate.results import (
     ClimbResult,
     NoiseFloorResult,
-    OptimumResult,
     ScreeningResult,
     SelectionResult,
     SurfaceResult,
@@ -158,10 +157,6 @@ def _fidelity(context: Context, result: FidelityResult) -> Chapter:
     return chapter("fidelity", {"cases": table})
 
 
-def _optimum(context: Context, result: OptimumResult) -> Chapter:
-    return chapter("optimum")
-
-
 def _responses(context: Context) -> list[Chapter]:
     campaign = context.campaign
     if campaign.surface is None or campaign.optimum is None or campaign.optimum.joint is None:
@@ -188,6 +183,6 @@ _STAGES: dict[str, Callable[[Context, Any], Chapter]] = {
     "climb": _climb,
     "surface": _surface,
     "fidelity": _fidelity,
-    "optimum": _optimum,
+    "optimum": lambda *_: chapter("optimum"),
     "verification": _verification,
 }

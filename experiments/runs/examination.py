@@ -8,7 +8,7 @@ import platform
 import re
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,8 @@ from typing import Any
 import warp as wp
 
 from dem_warp import (
+    MECHANISMS,
+    SCENES,
     Case,
     ClumpShape,
     GrainPopulation,
@@ -27,13 +29,17 @@ from dem_warp import (
 )
 from dem_warp.cores import cores
 from dem_warp.device import resolve_device
+from experiments.calibrate.screening_stage import DESIGNS
 from experiments.cases import Resources, open_workers
+from experiments.cases.engines.engines import ENGINES
 from experiments.cases.forecast.speed import UNKNOWN, noted_speed, source_of
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.resources import PROCESS_BYTES
 from experiments.cases.workers.submissions import submit_command
+from experiments.discover.mechanism_files import FILES
+from experiments.export import EXPORTERS
 from experiments.io.own_packages import OWN
-from experiments.io.plug_ins import described, plug_ins
+from experiments.io.plug_ins import PlugIn, described, plug_ins, skipped_for
 from experiments.io.program_version import ROOT, program_version
 from experiments.runs.choices import BENCH, PAPER
 from experiments.studyfile import load_study
@@ -45,6 +51,12 @@ GPU_WORLDS = 32
 USUAL = {False: (2e6, 5e7), True: (2e8, 2e10)}
 """Normal speeds of a worker on a core and on a GPU [sphere-steps/s]: 2 and 10 million on busy and quiet cores
 of servers, 7,000 million on an H200 with the paper's heaps."""
+
+REGISTRIES: dict[str, Mapping[str, Any]] = {
+    "laws": MECHANISMS, "scenes": SCENES, "mechanisms": FILES, "designs": DESIGNS, "engines": ENGINES,
+    "exporters": EXPORTERS,
+}  # fmt: skip
+"""What plug-ins add to, by the kind of an entry."""
 
 DEVICES, NVIDIA, MEMORY = Path("/sys/bus/pci/devices"), "0x10de", Path("/proc/meminfo")
 """Linux's list of devices, NVIDIA's number in it, and Linux's account of the memory."""
@@ -73,7 +85,7 @@ def examine(resources: Resources, cache: Finding) -> list[Finding]:
     return [
         Finding("versions", True, versions),
         Finding("packages", True, f"{', '.join(OWN)}: all of dem-warp, in {ROOT}"),
-        *(Finding("plug-in", True, str(each)) for each in plug_ins()),
+        *_tried("plug-in", lambda: [*map(_plug_in, plug_ins())]),
         *_tried("GPU", _gpus),
         *_tried("cores", _cores),
         *_tried("memory", lambda: [_memory(resources)]),
@@ -103,6 +115,14 @@ def kernel_cache() -> Finding:
         text = f"{error.filename}: {error.strerror or error}"
         cure = "Set WARP_CACHE_PATH to a folder that can be written."
         return Finding("kernel cache", False, text, needed=True, cure=cure)
+
+
+def _plug_in(each: PlugIn) -> Finding:
+    """Name the entries that their registry skips."""
+    named = ((entry, *entry.split(": ")) for entry in each.entries)
+    skipped = [f"skipped {one}, {skipped_for(one)}" for one, of, name in named if name not in REGISTRIES[of]]
+    cure = f"Correct the entry (its warning has the rule), or uninstall {each.package}." if skipped else ""
+    return Finding("plug-in", not skipped, "; ".join((str(each), *skipped)), cure=cure)
 
 
 def _used(resources: Resources) -> str:

@@ -155,9 +155,8 @@ def _of_factor(
 ) -> Candidate:
     test, parameter = section.test, section.parameter
     if test not in METHODS:
-        raise ValueError(
-            f"test must be a scene or a method, {nearest_name(test, [*scenes, *METHODS])}, got {test}"
-        )
+        near = nearest_name(test, [*scenes, *METHODS])
+        raise ValueError(f"test must be a scene or a method, not {test}; {near}")
     if section.observables or section.sizes:
         raise ValueError(f"observables and sizes belong to a scene, not to {test}")
     known = {place: factor for factor in factors for place in (factor.name, *factor.parameter)}

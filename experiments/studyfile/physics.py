@@ -17,6 +17,7 @@ from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, PouredScene, S
 from dem_warp.laws.mechanism import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, SIZE_LIMIT, size_of_mean_mass
 from dem_warp.scenes.walled_scene import TooManyGrainsError
+from experiments.io.plug_ins import made_in
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.proportions import narrowness
@@ -311,6 +312,8 @@ def _check_supply(case: Case) -> None:
     advice = "lower grain_count, or make the container smaller"
     grains: float
     try:
+        if isinstance(case.scene, PouredScene) and not (volume := case.scene.volume) > 0.0:
+            raise ValueError(f"{made_in(type(case.scene))} has volume_below = {volume}: it must be positive")
         grains = case.scene.supply(case)
     except OverflowError:  # a length whose square is beyond all floats
         grains = math.inf

@@ -151,14 +151,10 @@ def _distribution(section: SizesSection) -> tuple[Distribution, float]:
         return read_sieves(section.sieves, section.unit)
     if section.counts is not None:
         return read_counts(section.counts, section.unit, section.column), 0.0
-    first, second = (_term(section, name) for name in TERMS[section.distribution or ""])
+    first, second = (float(getattr(section, name)) for name in TERMS[section.distribution or ""])
     laws: Mapping[str, Any] = {
         "normal": lambda: stats.norm(first, second),
         "lognormal": lambda: stats.lognorm(math.log(second), scale=first),
         "rosin-rammler": lambda: stats.weibull_min(second, scale=first),
     }
     return Continuous(laws[section.distribution or ""]()), 0.0
-
-
-def _term(section: SizesSection, name: str) -> float:
-    return float(getattr(section, name))

@@ -25,12 +25,7 @@ from experiments.studyfile.cluster_section import ClusterSection
 from experiments.studyfile.conditions import BASE, Condition, Conditions, free_of
 from experiments.studyfile.direct_section import DirectSection, build_direct
 from experiments.studyfile.engine_section import EngineSection
-from experiments.studyfile.factor_section import (
-    FactorSection,
-    FactorTable,
-    merge,
-    natural_value,
-)
+from experiments.studyfile.factor_section import FactorSection, FactorTable, merge, natural_value
 from experiments.studyfile.observables import Observable, measurable
 from experiments.studyfile.physics import GrainCountError, Physics, Scene
 from experiments.studyfile.places import KeyPath, Places, drop, nested, value_at
@@ -118,6 +113,9 @@ class Study(Physics):
     _fixed: frozenset[str] = PrivateAttr(default=frozenset())
     _under: dict[str, Study] = PrivateAttr(default_factory=dict)
     _target: Target | None = PrivateAttr(default=None)
+
+    def __repr_args__(self) -> list[tuple[str | None, Any]]:
+        return [("name", self.name), ("scale", self.scale), ("factors", [*self._factors])]
 
     @cached_property
     def file(self) -> Path:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imaging.geometry import FloatArray, Frame, Layer, Picture, Spheres
+from imaging.picture_error import PictureError
 
 SUPERSAMPLING = 4
 """Factor by which the drawing of a silhouette is finer than the picture: 17 grey levels at an edge."""
@@ -21,6 +22,8 @@ CAVITY_SHADING = 0.6
 """Largest darkening of spheres behind their neighbours."""
 CAVITY_REACH = 0.02
 """Largest reach of that shading, three radii otherwise, as a share of the picture's width."""
+RUNS, MOST_RUNS = 10_000_000, 200_000_000
+"""Columns of spheres that a silhouette handles at a time, and in all: a heap of a million has 20 million."""
 FRAGMENT_LIMIT = 250_000
 """Pixels of spheres that the depth buffer handles at a time: few enough for a cache."""
 
@@ -34,14 +37,20 @@ def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
     """
     right, up, radii = _pixel_positions(spheres, frame, azimuth, SUPERSAMPLING)
     rows, columns = (SUPERSAMPLING * size for size in frame.shape)
-    sphere, column = _spans(right, radii, columns)
-    half_chord = np.sqrt(np.maximum(radii[sphere] ** 2 - (column + 0.5 - right[sphere]) ** 2, 0.0))
-    first = np.clip(np.ceil(up[sphere] - half_chord - 0.5), 0, rows).astype(np.int64)
-    last = np.clip(np.floor(up[sphere] + half_chord + 0.5), 0, rows).astype(np.int64)
-    # column after column: each closes all that it opens, so that one running sum serves them all
-    begin, size = column * (rows + 1), columns * (rows + 1)
-    depth_count = np.bincount(begin + first, minlength=size)
-    depth_count -= np.bincount(begin + np.maximum(first, last), minlength=size)
+    size = columns * (rows + 1)
+    if (runs := float(np.minimum(2.0 * radii + 1.0, columns).sum())) > MOST_RUNS:
+        raise PictureError("spheres", "too many at one place for one frame of one heap", len(radii))
+    depth_count = np.zeros(size, dtype=np.int64)
+    for part in np.array_split(np.arange(len(radii)), 1 + int(runs / RUNS)):
+        span, column = _spans(right[part], radii[part], columns)
+        sphere = part[span]
+        half_chord = np.sqrt(np.maximum(radii[sphere] ** 2 - (column + 0.5 - right[sphere]) ** 2, 0.0))
+        first = np.clip(np.ceil(up[sphere] - half_chord - 0.5), 0, rows).astype(np.int64)
+        last = np.clip(np.floor(up[sphere] + half_chord + 0.5), 0, rows).astype(np.int64)
+        # column after column: each closes all that it opens, so that one running sum serves them all
+        begin = column * (rows + 1)
+        depth_count += np.bincount(begin + first, minlength=size)
+        depth_count -= np.bincount(begin + np.maximum(first, last), minlength=size)
     covered = np.cumsum(depth_count, out=depth_count).reshape(columns, rows + 1)[:, :rows] > 0
     mask = covered.view(np.uint8) * np.uint8(255)
     return np.ascontiguousarray(cv2.resize(mask, frame.shape, interpolation=cv2.INTER_AREA).T)

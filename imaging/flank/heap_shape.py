@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imaging.flank.camera_height import level_outline
-from imaging.flank.fit_settings import FITS, FitSettings
+from imaging.flank.fit_settings import FITS
 from imaging.flank.flank_line import apex_column, fit_flanks
 from imaging.flank.outline import Outline
 from imaging.geometry import FloatArray
@@ -69,12 +69,9 @@ def heap_readings(outline: Outline, place: str = "outline") -> HeapReadings:
     volume = np.pi * float(ring.sum())
     center = 0.5 * float((ring * h).sum() / ring.sum())
     tangents = float(h.max()) / reach, 4.0 * center / reach, 3.0 * volume / (np.pi * reach**3)
-    lines = (_line_angle(level, FITS[fit], place) for fit in ("flank", "middle"))
+    flanks = (fit_flanks(level, FITS[fit], place) for fit in ("flank", "middle"))
+    lines = (float(np.mean([line.angle for line in sides])) for sides in flanks)
     return HeapReadings(*lines, *map(float, np.degrees(np.arctan(tangents))))
-
-
-def _line_angle(level: Outline, fit: FitSettings, place: str) -> float:
-    return float(np.mean([line.angle for line in fit_flanks(level, fit, place)]))
 
 
 def _width(level: Outline) -> float:

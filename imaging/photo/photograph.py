@@ -18,20 +18,9 @@ from imaging.flank.flank_line import fit_flanks
 from imaging.flank.outline import Doubt, Outline, levelled
 from imaging.flank.plate_line import PlateLine
 from imaging.geometry import FloatArray, Picture
-from imaging.photo.around_foot import (
-    NARROW_BASE,
-    FoundHeap,
-    darker_below,
-    refuse_narrow_base,
-    without_strays,
-)
+from imaging.photo.around_foot import NARROW_BASE, FoundHeap, darker_below, refuse_narrow_base, without_strays
 from imaging.photo.background import Contrast, contrast_with_background
-from imaging.photo.contrast_variants import (
-    cut_out,
-    with_low_threshold,
-    without_board,
-    without_shadows,
-)
+from imaging.photo.contrast_variants import cut_out, with_low_threshold, without_board, without_shadows
 from imaging.photo.doubts import (
     LARGEST_LEAN,
     LARGEST_MISFIT,
@@ -42,12 +31,7 @@ from imaging.photo.doubts import (
 )
 from imaging.photo.heap_on_plate import locate_heap
 from imaging.photo.view_settings import View
-from imaging.photo.wall_shadow import (
-    MOST_SHADED,
-    WIDELY_SHADED,
-    shaded_edge,
-    without_sharp_shadows,
-)
+from imaging.photo.wall_shadow import MOST_SHADED, WIDELY_SHADED, shaded_edge, without_sharp_shadows
 from imaging.picture_error import PictureError
 
 NO_HEAP = 0.1

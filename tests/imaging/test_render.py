@@ -11,7 +11,7 @@ from drawn_heaps import Camera, DrawnHeap, draw
 
 import imaging
 from imaging import PictureError, heap_angle, measure, measure_photograph, overlay, silhouette, snapshot
-from imaging.drawing import opengl
+from imaging.drawing import opengl, raster
 from imaging.geometry import Frame, Spheres
 
 
@@ -160,3 +160,14 @@ def test_plate_is_found_next_to_stray_grains(heap, tmp_path) -> None:
     plate = angle.outline.plate
     assert plate.row == pytest.approx(picture.ground_row, abs=0.5)
     assert plate.tilt == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_silhouette_in_parts_is_that_of_all_and_too_many_spheres_at_one_place_are_refused(
+    heap: Spheres, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = silhouette(heap.centers, heap.radii).image
+    monkeypatch.setattr(raster, "RUNS", 1000)
+    np.testing.assert_array_equal(silhouette(heap.centers, heap.radii).image, whole)
+    monkeypatch.setattr(raster, "MOST_RUNS", 1000)
+    with pytest.raises(PictureError, match="too many at one place"):
+        silhouette(heap.centers, heap.radii)

@@ -16,13 +16,7 @@ from doe.discrepancy.emulation.condition_surfaces import (
 )
 from doe.discrepancy.emulation.kriged_parts import BASE, KrigedParts
 from doe.discrepancy.emulation.run_noise import fit_noises
-from doe.discrepancy.emulation.surface_fits import (
-    AddedRuns,
-    BaseRuns,
-    fit_additions,
-    fit_bases,
-    repeats_of,
-)
+from doe.discrepancy.emulation.surface_fits import AddedRuns, BaseRuns, fit_additions, fit_bases, repeats_of
 from doe.discrepancy.problem.space import SearchSpace
 from doe.errors import RuleError
 from doe.numerics.one_thread import in_one_thread

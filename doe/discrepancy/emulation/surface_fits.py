@@ -13,21 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special, stats
 
-from doe.discrepancy.emulation.condition_surfaces import (
-    Addition,
-    Polynomial,
-    Surfaces,
-    added,
-    polynomial,
-)
+from doe.discrepancy.emulation.condition_surfaces import Addition, Polynomial, Surfaces, added, polynomial
 from doe.discrepancy.emulation.kriged_parts import Rest
-from doe.discrepancy.emulation.run_noise import (
-    ALIKE,
-    Noise,
-    correlation_of,
-    fit_growth,
-    repeat_deviations,
-)
+from doe.discrepancy.emulation.run_noise import ALIKE, Noise, correlation_of, fit_growth, repeat_deviations
 from doe.errors import RuleError
 from doe.numerics.kriging import Covariance, fit_noisy_kriging
 

@@ -200,7 +200,8 @@ class _RunningPrograms:
         if "error" in ending:
             raise AnswerError(f"the program {words[0]} could not be started: {ending['error']}")
         if code := ending.get("code", -1):
-            raise AnswerError(f"the program ended with {_ended_with(code)}{_last_line(folder)}")
+            how = f"the exit code {code}" if code >= 0 else f"the signal {-code}"
+            raise AnswerError(f"the program ended with {how}{_last_line(folder)}")
 
     def _wait_for(self, words: Sequence[str], folder: Path) -> None:
         """Run a program until it ends."""
@@ -249,10 +250,6 @@ def _ending(folder: Path) -> dict[str, Any]:
         return json.loads((folder / run_program.ENDING).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-
-
-def _ended_with(code: int) -> str:
-    return f"the exit code {code}" if code >= 0 else f"the signal {-code}"
 
 
 def _last_line(folder: Path) -> str:

@@ -36,8 +36,9 @@ def checked_result(case: Case, result: CaseResult, engine: Engine | None = None)
     if not isinstance(result, CaseResult):
         problem = f"{outside(engine)} must hand on a dem_warp.CaseResult for each case".lstrip()
         raise InputError("engine", problem, result)
-    finite = {name: value for name, value in result.observables.items() if _is_finite(value)}
-    wrong = [f"{name} = {value}" for name, value in result.observables.items() if name not in finite]
+    given = result.observables.items()
+    finite = {name: value for name, value in given if isinstance(value, Real) and math.isfinite(value)}
+    wrong = [f"{name} = {value}" for name, value in given if name not in finite]
     if not (shapes := _wrong_shapes(result)) and not np.isfinite(result.positions).all():
         wrong.append("positions that are not finite")
     if result.status != "finished" or not (wrong or shapes):
@@ -48,10 +49,6 @@ def checked_result(case: Case, result: CaseResult, engine: Engine | None = None)
     if shapes:
         return empty_result("failed", reason, result.provenance)
     return replace(result, status="failed", reason=reason, observables=finite)
-
-
-def _is_finite(value: object) -> bool:
-    return isinstance(value, Real) and math.isfinite(value)
 
 
 def _wrong_shapes(result: CaseResult) -> list[str]:

@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from dem_warp.solids import LARGEST_MESH, MESH_KINDS, read_mesh
 from experiments.io.errors import InputError
+from experiments.io.files import check_file, check_lines
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
 WELDED = 1e-6
 """Distance of corners that are one, over the mesh's length: single precision of files is 1e-7."""
+MOST_LINES = 1_000_000
+"""Lines of the largest text: corners and faces of the scan of a grain are a tenth of it."""
 
 Corners = NDArray[np.float64]
 Faces = NDArray[np.intp]
@@ -29,6 +32,9 @@ def read_surface(path: Path, unit: float) -> Trimesh:
     Corners at one place are welded, empty and doubled triangles dropped. Raise `InputError` with what is
     wrong with the surface, or `ValueError` of `read_mesh`.
     """
+    if path.is_file():
+        check_file(path, LARGEST_MESH)
+        check_lines(path, MOST_LINES, "Simplify it (in MeshLab: Quadric Edge Collapse Decimation).")
     try:
         with np.errstate(invalid="ignore"):  # the centre of an empty volume
             mesh = read_mesh(path, unit)
@@ -52,8 +58,6 @@ def _loaded(path: Path) -> tuple[Corners, Faces | None]:
     if kind not in MESH_KINDS:
         problem, hint = f"must be a mesh that ends in {', '.join(MESH_KINDS)}", "Export the shape as STL."
         raise InputError(str(path), problem, kind or "no ending", hint)
-    if path.stat().st_size > LARGEST_MESH:
-        return np.empty((0, 3)), None
     try:
         mesh = trimesh.load(io.BytesIO(path.read_bytes()), file_type=kind, process=False, force=None)
     except Exception:  # the reader has given its reason

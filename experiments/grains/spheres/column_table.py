@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from experiments.grains.spheres.sphere_file import (
-    LARGEST,
     TYPES,
     Columns,
     Format,
@@ -24,9 +23,10 @@ from experiments.grains.spheres.sphere_file import (
     SphereFile,
     content_lines,
     spheres_of,
+    text_of,
 )
 from experiments.io.errors import InputError
-from experiments.io.texts import read_text, split
+from experiments.io.texts import split
 from experiments.io.units import UNITS
 
 HEADER_LINES = 60
@@ -75,7 +75,7 @@ def _looks_like_a_table(head: str) -> bool:
 
 
 def _read(path: Path) -> SphereFile:
-    text = read_text(path, LARGEST)
+    text = text_of(path)
     found = _find_header(text)
     if found is None:
         lines = content_lines(text)

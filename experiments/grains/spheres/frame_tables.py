@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
-from experiments.grains.spheres.sphere_file import LARGEST, TYPES, Columns, Format, SphereFile, spheres_of
+from experiments.grains.spheres.sphere_file import TYPES, Columns, Format, SphereFile, spheres_of, text_of
 from experiments.io.errors import InputError
-from experiments.io.texts import is_number, read_text
+from experiments.io.texts import is_number
 
 _PROPERTIES = re.compile(r'\bProperties="?([\w:]+)', re.IGNORECASE)
 MERCURY_HEAD, MERCURY_ROW = 8, 14
 """Numbers of a frame's first line, ``n time xmin ymin zmin xmax ymax zmax``, and of a particle in space."""
+FRAMES = 10
+"""Largest frames that a file may have: it is read whole."""
 
 
 def _is_xyz(head: str) -> bool:
@@ -41,14 +44,14 @@ def _columns_of(line: str, path: Path) -> Columns:
     return Columns(x, x + 1, x + 2, at[size], is_diameter=size == "diameter", type=types)
 
 
-def _last_frame(path: Path, heads: int) -> tuple[list[str], list[tuple[int, list[str]]]]:
+def _last_frame(path: Path, heads: int) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     """Return the lines above the last whole frame of a file, and its numbered rows."""
-    lines, at, found = read_text(path, LARGEST).splitlines(), 0, None
+    lines, at, found = text_of(path, FRAMES).splitlines(), 0, None
     while at < len(lines) and (count := lines[at].split()[:1]) and count[0].isdigit():
         begin, end = at + heads, at + heads + int(count[0])
         if end > len(lines):
             break
-        found = lines[at:begin], [(n + 1, lines[n].split()) for n in range(begin, end)]
+        found = lines[at:begin], ((n + 1, lines[n].split()) for n in range(begin, end))
         at = end
     if found is None:
         raise InputError(str(path), "has no whole frame: the number of its first line exceeds its rows")

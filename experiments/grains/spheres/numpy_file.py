@@ -16,11 +16,8 @@ CENTERS, RADII = ("centers", "centres", "position", "positions", "xyz"), ("radiu
 def _read(path: Path) -> SphereFile:
     try:
         loaded = np.load(path)  # objects are refused: they could run code
-        arrays = (
-            {name.lower(): loaded[name] for name in loaded.files}
-            if hasattr(loaded, "files")
-            else {"": loaded}
-        )
+        named = getattr(loaded, "files", None)
+        arrays = {"": loaded} if named is None else {name.lower(): loaded[name] for name in named}
     except (OSError, ValueError, EOFError) as error:
         raise InputError(str(path), f"NumPy cannot read the file: {error}") from None
     centers, radii = (next((arrays[n] for n in names if n in arrays), None) for names in (CENTERS, RADII))
@@ -30,9 +27,8 @@ def _read(path: Path) -> SphereFile:
         table = arrays.get("", np.empty(0))
     if table.ndim != 2 or table.shape[1] != 4 or table.dtype.kind not in "fiu":
         shapes = ", ".join(f"{name} {array.shape}".strip() for name, array in arrays.items())
-        raise InputError(
-            str(path), f"needs arrays {CENTERS[0]} (n, 3) and {RADII[0]} (n), or one table (n, 4)", shapes
-        )
+        problem = f"needs arrays {CENTERS[0]} (n, 3) and {RADII[0]} (n), or one table (n, 4)"
+        raise InputError(str(path), problem, shapes)
     types = next((arrays[name] for name in TYPES if name in arrays), None)
     if types is not None and np.shape(types) != table.shape[:1]:
         raise InputError(str(path), "needs a type for each sphere", f"{np.shape(types)} for {len(table)}")

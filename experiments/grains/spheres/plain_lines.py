@@ -7,16 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from experiments.grains.spheres.sphere_file import (
-    LARGEST,
     SPHERE_RULE,
     Columns,
     Format,
     SphereFile,
     content_lines,
     spheres_of,
+    text_of,
 )
 from experiments.io.errors import InputError
-from experiments.io.texts import delimiter_of, is_number, read_text, split
+from experiments.io.texts import delimiter_of, is_number, split
 from experiments.io.units import UNITS
 
 _COLUMNS = re.compile(r"\bx,? y,? z,? r\b")
@@ -35,13 +35,13 @@ def _recognises(head: str) -> bool:
 
 
 def _read(path: Path) -> SphereFile:
-    text = read_text(path, LARGEST)
+    text = text_of(path)
     lines = content_lines(text)
     delimiter = delimiter_of(lines[0][1])
-    rows = [(number, split(line, delimiter)) for number, line in lines]
-    for number, cells in rows:
-        if len(cells) != 4:
+    for number, line in lines:
+        if len(cells := split(line, delimiter)) != 4:
             raise InputError(f"{path}, line {number}", SPHERE_RULE, " ".join(cells))
+    rows = ((number, split(line, delimiter)) for number, line in lines)
     description = "spheres (x y z r, as in multisphere templates of LIGGGHTS)"
     read = spheres_of(description, rows, Columns(0, 1, 2, 3), path, delimiter)
     return replace(read, unit=_named_unit(text))

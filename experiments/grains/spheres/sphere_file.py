@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.io.errors import InputError
-from experiments.io.texts import is_number, number
+from experiments.io.files import check_lines
+from experiments.io.texts import is_number, number, read_text
 
 SPHERE_RULE = "a sphere must be x y z r: four finite numbers, r > 0"
 
@@ -20,7 +21,11 @@ TYPES = (
 )  # fmt: skip
 """Names of a type's column or array, in lower case without marks."""
 LARGEST = 500_000_000
-"""Size of the largest file of spheres that is read [bytes]: frames of a heap of millions."""
+"""Size of the largest file of spheres that is read [bytes]: many frames of a heap."""
+MOST = 1_500_000
+"""Most spheres of a frame, and lines of a text of one frame."""
+MANY = "Write the grains of the heap alone, and one frame."
+"""Hint for a file of more."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +122,8 @@ def spheres_of(
         if not np.isfinite(row).all() or row[3] <= 0.0:
             raise InputError(f"{path}, {kind} {line}", SPHERE_RULE, " ".join(cells))
         values.append(row)
+        if len(values) > MOST:
+            raise InputError(str(path), f"must have at most {MOST:,} spheres", "more", MANY)
         if columns.type is not None:
             types.append(_type_name(cells[columns.type]) if len(cells) > columns.type else "")
     if not values:
@@ -125,6 +132,12 @@ def spheres_of(
     spheres = table[:, :4] * np.array([1.0, 1.0, 1.0, 0.5 if columns.is_diameter else 1.0])
     bodies = None if columns.body is None else own_bodies(table[:, 4])
     return SphereFile(description, spheres, bodies, types=np.array(types) if types else None)
+
+
+def text_of(path: Path, frames: int = 1) -> str:
+    """Read a text with lines for so many frames of `MOST` spheres; see `read_text`."""
+    check_lines(path, frames * MOST, MANY)
+    return read_text(path, LARGEST)
 
 
 def _type_name(cell: str) -> str:

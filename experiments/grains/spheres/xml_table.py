@@ -13,16 +13,18 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from experiments.grains.spheres.column_table import column_kind
-from experiments.grains.spheres.sphere_file import LARGEST, Columns, Format, SphereFile, spheres_of
+from experiments.grains.spheres.sphere_file import Columns, Format, SphereFile, spheres_of
 from experiments.io.errors import InputError
 from experiments.io.texts import read_text
 from experiments.io.units import UNITS
 
 _NEEDED = ("x", "y", "z")
+LARGEST_XML = 100_000_000
+"""Bytes of the largest file, whose tree takes ten times as many: a million spheres."""
 
 
 def _read(path: Path) -> SphereFile:
-    text = read_text(path, LARGEST)
+    text = read_text(path, LARGEST_XML)
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text):
         raise InputError(str(path), "XML with a document type or entities is not read")
     try:

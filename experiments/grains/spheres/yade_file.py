@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from experiments.grains.spheres.sphere_file import (
-    LARGEST,
     Columns,
     Format,
     SphereFile,
     content_lines,
     spheres_of,
+    text_of,
 )
 from experiments.io.errors import InputError
 from experiments.io.texts import read_text
@@ -35,7 +35,7 @@ LAYOUTS = {
 
 
 def _read_text(path: Path) -> SphereFile:
-    text = read_text(path, LARGEST)
+    text = text_of(path)
     name = text.partition("\n")[0].removeprefix(_HEADER).strip()
     if name not in LAYOUTS:
         problem = f"must be a format of Yade with spheres ({', '.join(LAYOUTS)})"

@@ -94,7 +94,8 @@ class StartedRuns:
         others = [
             path.relative_to(self.folder).as_posix()
             for path in matching(self.folder, "out/*/")
-            if _is_run(path) and not path.is_symlink()
+            if any((path / name).exists() for name in ("study.json", "angle.json", ".live"))
+            and not path.is_symlink()
         ]
         return list(dict.fromkeys([*reversed(self._started), *others]))
 
@@ -129,7 +130,3 @@ class StartedRuns:
         if not parts or Path(out).is_absolute() or ".." in parts or any(p.startswith(".") for p in parts):
             raise InputError("--out", "must be a folder below the one of this page", out)
         return Path(out).as_posix()
-
-
-def _is_run(folder: Path) -> bool:
-    return any((folder / name).exists() for name in ("study.json", "angle.json", ".live"))

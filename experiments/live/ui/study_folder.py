@@ -22,12 +22,7 @@ from experiments.io.toml_files import read_toml, toml_text
 from experiments.io.units import read_quantity, read_share
 from experiments.live.run_files import inside
 from experiments.live.watch_routes import problems_of
-from experiments.measurement.photographs import (
-    PictureOptions,
-    find_pictures,
-    mean_angle,
-    measure_pictures,
-)
+from experiments.measurement.photographs import PictureOptions, find_pictures, mean_angle, measure_pictures
 from experiments.studyfile import Study, load_study, study_scales
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.new_study import TEMPLATE, new_study_path

@@ -236,7 +236,7 @@ def test_without_equivalence_a_campaign_is_not_calibrated() -> None:
     campaign = calibrate(analytic_study(verification={"margin": 0.05}), AnalyticHeaps(two_frictions))
     assert campaign.outcome is Outcome.UNDECIDED
     assert not campaign.verification.leading.different
-    assert "equivalence is not shown for angle" in campaign.reason
+    assert "no difference is found, but equivalence is not shown for angle within" in campaign.reason
     assert "% of the settings that the surface covers" in campaign.reason
 
 

@@ -2,6 +2,7 @@
 
 import os
 import time
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,8 @@ from dem_warp.solids import read_mesh
 from doe import DesignError
 from doe.discrepancy import load_bank
 from experiments.cases.store.outcome_table import OutcomeTable
+from experiments.grains.clumps.mesh_file import read_surface
+from experiments.grains.spheres import read_spheres
 from experiments.io import errors, rows, toml_files, units
 from experiments.measurement.measured_target import with_measurements
 from experiments.runs.choices import measured_study
@@ -127,6 +130,43 @@ def test_a_clump_has_a_limit_of_spheres(tmp_path: Path) -> None:
     path.write_text("0 0 0 1\n" * 20_000, encoding="utf-8")
     with pytest.raises(ValueError, match="at most 256 spheres"):
         ClumpShape.read(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "said"),
+    [
+        ("plain.txt", "", "at most 1,500,000 lines, got 1,600,000. Write the grains of the heap alone"),
+        ("table.csv", "x y z r\n", "at most 1,500,000 lines, got 1,600,001"),
+        ("yade.txt", "#format x_y_z_r\n", "at most 1,500,000 lines, got 1,600,001"),
+        ("cloud.off", "OFF\n1600000 0 0\n", "at most 1,000,000 lines, got 1,600,002. Simplify it"),
+    ],
+)
+def test_a_text_of_too_many_spheres_or_corners_is_not_read(
+    tmp_path: Path, name: str, start: str, said: str
+) -> None:
+    path = tmp_path / name
+    path.write_text(start + "0 0 0 1\n" * 1_600_000, encoding="utf-8")
+    tracemalloc.start()
+    with pytest.raises(errors.InputError, match=said):
+        read_surface(path, 1.0) if name.endswith("off") else read_spheres(path)
+    # the file has 13 MB, its lines as Python's texts ten times as many; it is looked through by the megabyte
+    assert tracemalloc.get_traced_memory()[1] < 8e6
+    tracemalloc.stop()
+
+
+def test_a_frame_of_too_many_spheres_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.grains.spheres.sphere_file.MOST", 3)
+    table = np.ones((4, 4))
+    for number in (3, 4):
+        np.save(tmp_path / "heap.npy", table[:number])
+        atoms = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{}\nITEM: ATOMS x y z radius\n{}"
+        (tmp_path / "heap.dump").write_text(atoms.format(number, "1 1 1 1\n" * number), encoding="utf-8")
+        for name in ("heap.npy", "heap.dump"):
+            if number == 3:
+                assert len(read_spheres(tmp_path / name).spheres) == 3
+                continue
+            with pytest.raises(errors.InputError, match=r"at most 3 spheres, got more\. Write"):
+                read_spheres(tmp_path / name)
 
 
 def test_a_small_bank_that_claims_much_is_refused(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from importlib import import_module
 from typing import Any
 
@@ -18,15 +18,23 @@ from experiments.commands.console import clear_errors
 from experiments.export import EXPORTERS, ExportedTest, Exporter, case_terms, export_input
 from experiments.io import plug_ins
 from experiments.io.errors import InputError
+from experiments.io.plug_ins import PlugIn
 from experiments.report.other_codes import other_codes_chapter
+from experiments.runs import examination
 from experiments.studyfile import Study
+from experiments.studyfile.physics import _check_supply as check_supply
 
 FAULTS = """
 import warp as wp
+from dem_warp import LiftedCylinder
 from dem_warp.laws.jkr import JKR
 
 class Hidden(JKR):
     name = "hidden"
+
+class Vat(LiftedCylinder):
+    def volume_below(self, height):
+        return float("nan")
 
 @wp.kernel
 def wrong(count: int):
@@ -49,7 +57,9 @@ def faults(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     folder.mkdir()
     (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: grain-faults\nVersion: 1.0\n")
     (folder / "top_level.txt").write_text("grain_faults\n")
-    (folder / "entry_points.txt").write_text("[dem_warp.engines]\nraising = grain_faults:raising\n")
+    (folder / "entry_points.txt").write_text(
+        "[dem_warp.engines]\nraising = grain_faults:raising\n[dem_warp.laws]\nlost = grain_faults:Lost\n"
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(site))
         _forget()
@@ -94,6 +104,24 @@ def test_a_law_that_no_entry_point_announces_is_named(faults: Any, small_study: 
     with pytest.raises(InputError, match=r"contact law hidden: .* must be an entry point") as error:
         OwnWorkers("cpu").simulate([case])
     assert placed(str(error.value), faults)
+
+
+def test_a_scene_without_a_volume_is_named(faults: Any, small_study: Study) -> None:
+    case = small_study.case({}, 1)
+    vat = faults.Vat(**{part.name: getattr(case.scene, part.name) for part in fields(case.scene)})
+    with pytest.raises(ValueError, match="has volume_below = nan: it must be positive") as error:
+        check_supply(replace(case, scene=vat))
+    assert placed(str(error.value), faults)
+
+
+def test_the_doctor_finds_an_entry_that_cannot_be_loaded(faults: Any) -> None:
+    good, lost = (
+        examination._plug_in(PlugIn("grain-faults", "1.0", (f"laws: {name}",))) for name in ("jkr", "lost")
+    )
+    assert (good.good, good.text, good.cure) == (True, "grain-faults 1.0 (laws: jkr)", "")
+    assert not lost.good
+    assert "skipped laws: lost, AttributeError" in lost.text
+    assert lost.cure.endswith("or uninstall grain-faults.")
 
 
 def test_an_error_in_a_device_function_names_it(faults: Any) -> None:

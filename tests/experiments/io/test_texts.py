@@ -109,6 +109,11 @@ def test_an_error_has_a_place_a_problem_a_value_and_a_hint() -> None:
     assert str(InputError("x", "must be one", "2", "Use 1.")) == "x: must be one, got 2. Use 1."
 
 
+def test_a_value_after_a_question_begins_a_sentence() -> None:
+    asked = Problem("s.toml: grain.size_sdd", "unknown key, did you mean 'size_sd'?", "500.0")
+    assert str(asked) == "s.toml: grain.size_sdd: unknown key, did you mean 'size_sd'? Got 500.0"
+
+
 def test_a_machine_without_a_gpu_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dem_warp.device.wp.get_devices", lambda: ["cpu"])
     with pytest.raises(ValueError, match="no NVIDIA GPU with a CUDA driver was found"):

@@ -272,3 +272,11 @@ def test_a_design_from_outside_may_have_any_number_of_runs() -> None:
     assert campaign.ScreeningSettings(design="three-levels", runs=9).runs == 9
     with pytest.raises(ValueError, match="must be a multiple of 4"):
         campaign.ScreeningSettings(runs=9)
+
+
+def test_a_study_is_printed_in_a_line() -> None:
+    study = load_study(scale="bench")
+    for text in (str(study), repr(study)):
+        assert "\n" not in text
+        assert len(text) < 200, "two lines of a terminal"
+        assert all(repr(each) in text for each in (study.name, study.scale, *(f.name for f in study.factors)))
