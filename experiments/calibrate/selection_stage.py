@@ -41,7 +41,9 @@ def select_factors(
     kept = tuple(name for name in screening.design.names if name in chosen)
     cases = len(leading.screen.response)
     table = ranked[["effect", "p", "percent", "rank"]].copy()
-    table["visible"] = table["effect"].abs() > _noise_effect(floor, cases, settings.alpha)
+    # what seeds alone exceed with probability alpha: an effect's error is 2 sd / sqrt(n)
+    noise = float(stats.t.isf(0.5 * settings.alpha, floor.sample.df)) * 2.0 * floor.sd / math.sqrt(cases)
+    table["visible"] = table["effect"].abs() > noise
     for name in p.columns[1:]:
         table[f"p_{name}"] = p[name]
     table["kept"] = table.index.isin(kept)
@@ -93,11 +95,6 @@ def _reason(settings: SelectionSettings, name: str, kept: tuple[str, ...], p: pd
     if not moved:
         return f"strongest of at least {settings.at_least}"
     return "significant" if len(p) == 1 else f"significant for {', '.join(moved)}"
-
-
-def _noise_effect(floor: NoiseFloor, cases: int, alpha: float) -> float:
-    """Return the effect that seeds alone exceed with probability alpha (its error: 2 sd / sqrt(n))."""
-    return float(stats.t.isf(0.5 * alpha, floor.sample.df)) * 2.0 * floor.sd / math.sqrt(cases)
 
 
 def _kept_decision(

@@ -13,6 +13,9 @@ from experiments.io import excel_files
 from experiments.io.errors import InputError
 from experiments.io.texts import is_number, nearest_name, read_text
 
+_COMMA = re.compile(r"^([+-]?\d+),(\d+(?:[eE][+-]?\d+)?)(?=\s|$)")
+"""Number with a decimal comma, alone or before its unit."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -80,7 +83,7 @@ def _lines(path: Path, numbered: bool) -> Iterator[tuple[int, list[str]]]:
         for line, row in rows:
             cells = [cell.strip() for cell in row]
             if delimiter != ",":
-                cells = [_with_point(cell) for cell in cells]
+                cells = [_COMMA.sub(r"\1.\2", cell) for cell in cells]
             number = numbered and re.fullmatch(r"# ?\d+", cells[0] if cells else "") and any(cells[1:])
             if any(cells) and (number or not cells[0].startswith("#")):
                 yield line, cells
@@ -103,11 +106,6 @@ def _delimiter(text: str) -> str:
     lines = (line.strip() for line in text.splitlines())
     header = next((line for line in lines if line and not line.lstrip('"').startswith("#")), "")
     return next((mark for mark in ";\t" if mark in header), ",")
-
-
-def _with_point(cell: str) -> str:
-    """Write a number with a decimal comma, alone or before its unit, with a point."""
-    return re.sub(r"^([+-]?\d+),(\d+(?:[eE][+-]?\d+)?)(?=\s|$)", r"\1.\2", cell)
 
 
 def _check_header(
