@@ -42,8 +42,8 @@ def select_factors(
     cases = len(leading.screen.response)
     table = ranked[["effect", "p", "percent", "rank"]].copy()
     # what seeds alone exceed with probability alpha: an effect's error is 2 sd / sqrt(n)
-    noise = float(stats.t.isf(0.5 * settings.alpha, floor.sample.df)) * 2.0 * floor.sd / math.sqrt(cases)
-    table["visible"] = table["effect"].abs() > noise
+    alone = float(stats.t.isf(0.5 * settings.alpha, floor.sample.df)) * 2.0 * floor.sd / math.sqrt(cases)
+    table["visible"] = table["effect"].abs() > alone
     for name in p.columns[1:]:
         table[f"p_{name}"] = p[name]
     table["kept"] = table.index.isin(kept)

@@ -110,7 +110,7 @@ def test_spheres_of_a_grain_belong_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
-        ("", "heap.csv: not a file of spheres"),
+        ("", "heap.csv: is empty"),
         ("x,y,z,r\n", "has no spheres"),
         ("x,y,z\n1,2,3\n", "not a file of spheres"),
         ("x,y,z,r\n1,2,3\n", "line 2: a sphere must be x y z r"),
