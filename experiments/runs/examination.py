@@ -56,7 +56,7 @@ REGISTRIES: dict[str, Mapping[str, Any]] = {
     "laws": MECHANISMS, "scenes": SCENES, "mechanisms": FILES, "designs": DESIGNS, "engines": ENGINES,
     "exporters": EXPORTERS,
 }  # fmt: skip
-"""What plug-ins add to, by the kind of an entry."""
+"""Registries that plug-ins add to, by the kind of an entry."""
 
 DEVICES, NVIDIA, MEMORY = Path("/sys/bus/pci/devices"), "0x10de", Path("/proc/meminfo")
 """Linux's list of devices, NVIDIA's number in it, and Linux's account of the memory."""

@@ -135,7 +135,7 @@ def spheres_of(
 
 
 def text_of(path: Path, frames: int = 1) -> str:
-    """Read a text with lines for so many frames of `MOST` spheres; see `read_text`."""
+    """Read a text with lines for at most `frames` times `MOST` spheres; see `read_text`."""
     check_lines(path, frames * MOST, MANY)
     return read_text(path, LARGEST)
 
