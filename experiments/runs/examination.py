@@ -30,8 +30,7 @@ from dem_warp import (
 from dem_warp.cores import cores
 from dem_warp.device import resolve_device
 from experiments.calibrate.screening_stage import DESIGNS
-from experiments.cases import Resources, open_workers
-from experiments.cases.engines.engines import ENGINES
+from experiments.cases import ENGINES, Resources, open_workers
 from experiments.cases.forecast.speed import UNKNOWN, noted_speed, source_of
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.resources import PROCESS_BYTES
