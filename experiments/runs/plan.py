@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -170,6 +170,8 @@ def _plan(command: str, prepared: Prepared, stages: Sequence[_Stage], stored: fl
     rest = PlannedBatch("start, report", 0, 0, 0, 0, 0, *forecast([rest_of(command)], resources))
     try:
         batches = (*(_batch(*stage, resources) for stage in stages), rest)
+        if study.engine and study.engine.by:  # nobody knows how long a person takes
+            batches = tuple(replace(batch, seconds=None) for batch in batches)
         cases = [case for _, some, *_ in stages for case in some]
         memory = resources.memory(cases, max((stage[3] for stage in stages), default=0))
     except ValueError as error:  # the reason why a case cannot begin

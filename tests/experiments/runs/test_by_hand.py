@@ -272,6 +272,13 @@ def answer(sheet: Path, person: EmulatedSimulator) -> None:
     sheet.write_text(head + runs.to_csv(index=False), encoding="utf-8")
 
 
+def test_the_time_that_a_person_takes_is_not_forecast(study: Path) -> None:
+    words = ("calibrate", study, "--scale", "paper", "--by-hand", "--dry-run", "--json")
+    code, out, said = dem_warp(*words)
+    assert code == 0, said
+    assert json.loads(out)["seconds"] is None
+
+
 def test_only_campaigns_and_searches_wait_for_a_person(study: Path) -> None:
     code, _, said = dem_warp("heap", study, "--scale", "bench", "--engine", "hand", "--out", "one")
     assert code == 2
