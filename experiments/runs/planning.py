@@ -17,18 +17,23 @@ from experiments.calibrate.plan.knowledge import Size
 from experiments.calibrate.plan.present import Present, fit_responses, known_here, present_of
 from experiments.cases.forecast.work import work_of
 from experiments.io.errors import StudyError
+from experiments.io.texts import enumeration
 from experiments.io.toml_files import read_toml
 from experiments.report.material_card import CARD
 from experiments.report.writer import write_plan
 from experiments.runs.choices import Prepared, measured_study, prepare
 from experiments.runs.request import RunRequest
 from experiments.runs.run_folder import Run, open_run
-from experiments.studyfile import Study
+from experiments.studyfile import Study, load_card
 from experiments.studyfile.campaign import Response, near_readings, scenes_of
 from experiments.studyfile.candidate_section import Candidate
 
 CENTER, MOST_FACTORS = 5, 5
 """Replicates at the centre of the design, for the noise, and factors of one of at most 31 cases."""
+
+
+CARD_ROUNDING = 1e-3
+"""Relative difference that values of a card may have by its four digits."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +72,7 @@ def prepare_plan(study: Study | str | Path, request: RunRequest, after: Path | N
     if after is not None:
         card = after / CARD if after.is_dir() else after
         present, targets = present_of(read_toml(card)[1], card), ()
+        _require_grain_of(card, run.study)
         known, factors = set(present.known), present.box(run.study.limits)
     if not 1 <= len(factors) <= MOST_FACTORS:
         hint = "Set [campaign.selection] keep, or name a finished campaign: --after FOLDER."
@@ -75,6 +81,23 @@ def prepare_plan(study: Study | str | Path, request: RunRequest, after: Path | N
     wanted = {(one.scene, one.observable): one for one in (*read, *targets)}
     responses = tuple(one for key, one in wanted.items() if key not in known)
     return PreparedPlan(run, present, central_composite(factors, "face", CENTER), responses)
+
+
+def _require_grain_of(card: Path, study: Study) -> None:
+    """Refuse the card of a campaign with another grain, or with factors that the study lacks."""
+    chosen = {name: facts["chosen"] for name, facts in read_toml(card)[1].get("factor", {}).items()}
+    theirs, own = (one.grains for one in (load_card(card).case({}, 0), study.case(chosen, 0)))
+    numbers = {
+        "spheres": lambda grain: grain.sphere_count,
+        "smallest sphere": lambda grain: grain.smallest_sphere,
+        "mass": lambda grain: (
+            grain.material.density * grain.size_mean**3 * grain.mean(lambda shape: shape.volume)
+        ),
+    }
+    apart = [name for name, of in numbers.items() if not np.isclose(of(theirs), of(own), rtol=CARD_ROUNDING)]
+    if apart:
+        problem = f"is of another grain than the study's: {enumeration(apart)} differ"
+        raise StudyError(str(card), problem, hint="Name a campaign of this grain, or plan without --after.")
 
 
 def run_plan(prepared: PreparedPlan) -> TestPlan:

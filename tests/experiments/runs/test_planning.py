@@ -95,6 +95,14 @@ def test_a_plan_after_a_campaign_takes_its_region(
     times = {row.pop("seconds") for row in (*found["rows"], *again["rows"])}  # all else is the same
     assert 0.0 in times
     assert found == again
+    # what it knows of the angle is of other heaps
+    grain, name = ('sphere = "2 mm"\ndensity = "700', 'name = "E"')
+    other, renamed = (grain, 'sphere = "3 mm"\ndensity = "900'), (name, 'name = "friction"')
+    said = refused("plan", write_study(other, add=CANDIDATES), "--after", campaign)
+    assert "is of another grain than the study's: smallest sphere and mass differ" in said
+    candidates = CANDIDATES.replace('parameter = "E"', 'parameter = "friction"')
+    said = refused("plan", write_study(renamed, add=candidates), "--after", campaign)
+    assert "must name a factor" in said
 
 
 def test_the_cases_of_a_plan_are_forecast(write_study: Write) -> None:
