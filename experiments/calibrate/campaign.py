@@ -23,6 +23,7 @@ from experiments.calibrate.results import (
     VerificationResult,
     failed,
 )
+from experiments.calibrate.worth import costs_of
 from experiments.io.plain_data import indexed, jsonable
 
 if TYPE_CHECKING:
@@ -79,14 +80,8 @@ class Campaign:
 
     @property
     def scene_costs(self) -> pd.DataFrame:
-        """Cost of every scene (index ``scene``): cases, simulated_time [s], grain_time [s].
-
-        The last is the simulated time of every grain together, to which the work is nearly proportional.
-        """
-        known = self.cases.reindex(columns=["scene", "simulated_time", "grain_count"])
-        known = known.assign(grain_time=known["simulated_time"] * known["grain_count"])
-        groups = known.groupby("scene", sort=False)
-        return groups[["simulated_time", "grain_time"]].sum().assign(cases=groups.size())
+        """Cost of every scene."""
+        return costs_of(self.cases)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain JSON data; numbers that are not finite are null."""

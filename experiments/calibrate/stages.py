@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import pandas as pd
@@ -39,6 +40,7 @@ from experiments.calibrate.surface_stage import (
 from experiments.calibrate.target_stage import plan_target, settle_target
 from experiments.calibrate.values import p_text, quantity, worded
 from experiments.calibrate.verification_stage import plan_verification, verify
+from experiments.calibrate.worth import useless_tests
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
 
@@ -135,7 +137,9 @@ def _run(study: Study, record: _Record) -> tuple[Outcome, str]:
     """Run the stages one after another and return the outcome; StageEnd where the campaign cannot go on."""
     study, target, noise, screening = _open(study, record)
     settings, response = study.campaign.selection, study.target.leading
-    selection = record.keep("selection", select_factors(settings, screening, noise, response))
+    selection = select_factors(settings, screening, noise, response)
+    useless = useless_tests(study, selection.kept, target, noise, screening) if selection.kept else ()
+    record.keep("selection", replace(selection, decisions=(*selection.decisions, *useless)))
     require_kept(study, selection)
     box = fixed_box(study, selection.kept)
     early = _early_optimum(study, box, target, record)

@@ -33,6 +33,9 @@ def show_plan(plan: Plan, as_json: bool) -> NoReturn:
             typer.echo(plain(f"Phases of {batch.name}: {_phases(batch)}."))
     for doubt in plan.doubts:
         typer.echo(plain(f"Doubtful: {doubt}"))
+    if len(plan.shares) > 1:
+        shares = ", ".join(f"{scene} {share:.0%}" for scene, share in plan.shares.items())
+        typer.echo(plain(f"Work of a setting: {shares}. What a test buys, dem-warp plan finds beforehand."))
     seconds, source = totals["seconds"], totals["source"]
     what = "on each GPU" if plan.on_gpu else "on this machine"
     typer.echo(f"Cases in total: {totals['cases']:,}, at most {totals['most']:,}.")

@@ -69,6 +69,8 @@ class Plan:
     on_gpu: bool
     doubts: tuple[str, ...] = ()
     """Unlikely values of the study."""
+    shares: Mapping[str, float] = field(default_factory=dict)
+    """Share of each scene in the work of one setting of a campaign."""
 
     @property
     def totals(self) -> dict[str, Any]:
@@ -91,7 +93,10 @@ def plan_calibration(prepared: Prepared) -> Plan:
     study = with_pictures(prepared).study
     stages = _campaign_stages(study)
     grains = max(work_of(case).grains for _, some, *_ in stages for case in some)
-    return _plan("calibrate", prepared, stages, CASE_BYTES + GRAIN_BYTES * grains)
+    plan = _plan("calibrate", prepared, stages, CASE_BYTES + GRAIN_BYTES * grains)
+    cases = {scene: work_of(study.case({}, 1, scene)) for scene in scenes_of(study.target.responses)}
+    work = {scene: one.spheres * one.steps for scene, one in cases.items()}
+    return replace(plan, shares={scene: one / sum(work.values()) for scene, one in work.items()})
 
 
 def _campaign_stages(study: Study) -> list[_Stage]:

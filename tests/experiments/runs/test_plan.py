@@ -62,6 +62,33 @@ def test_cases_that_a_study_fixes_are_planned_in_the_batch_they_run_in(write_stu
     assert (all_fixed["cases"], all_fixed["most"]) == (open_["cases"], open_["most"])
 
 
+TWICE = """
+[response-scene.again.lifted-cylinder]
+diameter = "28 mm"
+height = "28 mm"
+grain_count = 60
+
+[[response]]
+name = "other"
+observable = "angle"
+scene = "again"
+mean = "30 deg"
+sd = "0.5 deg"
+n = 5
+"""
+
+
+def test_the_share_of_each_test_in_the_work_is_told(write_study: Write) -> None:
+    study = write_study(add=TWICE)
+    shares = planned("calibrate", study)["shares"]
+    # twice the grains, and as much time or more
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert shares["again"] >= 2.0 * shares["target"]
+    said = dem_warp("calibrate", study, "--dry-run")[1]
+    assert f"Work of a setting: target {shares['target']:.0%}, again {shares['again']:.0%}." in said
+    assert planned("calibrate", write_study())["shares"] == {"target": 1.0}
+
+
 def test_a_plan_reads_well(write_study: Write, tmp_path: Path) -> None:
     code, out, _ = dem_warp("calibrate", write_study(), "--device", "cpu", "--workers", 2, "--dry-run")
     assert code == 0
