@@ -105,7 +105,7 @@ class CurveFit:
         emulator = self.emulators[condition]
         chosen = self.settings[rng.integers(len(self.settings), size=draws)]
         scores, variances = emulator.scores(chosen)
-        scores = scores + rng.normal(size=scores.shape) * np.sqrt(variances + emulator.noises)
+        scores = scores + rng.normal(size=scores.shape) * np.sqrt(variances + emulator.noise(chosen))
         curves = emulator.mean + scores @ emulator.components
         curves += rng.normal(size=curves.shape) * np.sqrt(emulator.remainder)
         here = np.full(len(self.places), coordinate), self.places

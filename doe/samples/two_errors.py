@@ -79,7 +79,7 @@ class TwoErrors:
 
         def excess(log_level: float) -> float:
             level = float(np.exp(log_level))
-            found = _half_width(self.first_df, self.second_df, np.array(share), level, *self._rule(level))
+            found = _half_width(self.first_df, self.second_df, np.array(share), level, *self.rule(level))
             return float(np.log(found) - np.log(size))
 
         lowest, highest = np.log(1e-100), np.log(0.9999)
@@ -87,12 +87,8 @@ class TwoErrors:
             return 0.0 if excess(lowest) <= 0.0 else 1.0
         return float(np.exp(optimize.brentq(excess, lowest, highest, xtol=1e-10)))
 
-    def extreme_levels(self, alpha: float) -> tuple[float, float]:
-        """Return the smallest and largest probability of a false alarm over all ratios of the variances."""
-        found = false_alarms(min(self.first_df, MANY), min(self.second_df, MANY), alpha, *self._rule(alpha))
-        return float(found.min()), float(found.max())
-
-    def _rule(self, alpha: float) -> tuple[float, float]:
+    def rule(self, alpha: float) -> tuple[float, float]:
+        """Return k and q (see the module) at a level."""
         return _rule(min(self.first_df, MANY), min(self.second_df, MANY), alpha)
 
 
@@ -105,7 +101,7 @@ def located(share: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.fl
 
 @cache
 def _table(first_df: float, second_df: float, alpha: float) -> NDArray[np.float64]:
-    rule = TwoErrors(first_df, second_df)._rule(alpha)
+    rule = TwoErrors(first_df, second_df).rule(alpha)
     return _half_width(first_df, second_df, SHARES, alpha, *rule)
 
 

@@ -31,6 +31,8 @@ OPTIMUM_EXAMPLE = "Example: [bold]dem-warp doe optimum runs.csv --wish angle=28.
 CLIMB_EXAMPLE = "Example: [bold]dem-warp doe climb climb.csv --target 28.6[/]"
 COMPARE_EXAMPLE = "Example: [bold]dem-warp doe compare runs.csv --value simulated --reference measured[/]"
 
+CURVE_EXAMPLE = "Example: [bold]dem-warp doe curve runs.csv --measured edge.csv --reading 0.1[/]"
+
 Table = Annotated[Path, typer.Argument(metavar="TABLE.csv", help="Runs: factors, and at least one response.")]
 Factors = Annotated[
     list[str] | None,
@@ -258,6 +260,31 @@ def compare(
 
         answer = compare_columns(read_columns(table, [value, reference]), value_sd, reference_sd)
     _show(answer, out, as_json, str(table))
+
+
+@doe.command(epilog=CURVE_EXAMPLE)
+def curve(
+    table: Annotated[
+        Path, typer.Argument(metavar="TABLE.csv", help="Runs: factors, and heights under their places.")
+    ],
+    measured: Annotated[Path, typer.Option(metavar="CURVE.csv", help="Measured curve: places, and heights.")],
+    reading: Annotated[float, typer.Option(help="Standard deviation of one measured height.", min=1e-12)],
+    factor: Factors = None,
+    varying: Annotated[
+        bool, typer.Option("--varying-noise", help="The scatter of a run depends on its settings.")
+    ] = False,
+    alpha: Alpha = 0.05,
+    seed: Annotated[int, typer.Option(help="Seed of the search.", min=0)] = 0,
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the settings whose simulated curve agrees with a measured one."""
+    with clear_errors():
+        from experiments.commands.tables.curves import fit_curve, read_curves, read_measured
+
+        sheet = read_curves(table, factor or [])
+        answer = fit_curve(sheet, read_measured(measured), reading, varying, alpha, seed)
+    _show(answer, out, as_json, f"{table} and {measured}")
 
 
 def _sheet(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from doe.curves.candidates import Candidates
 from doe.curves.curve_emulator import CurveEmulator
 from doe.curves.curve_fit import CurveFit, MeasuredCurve, fit_curves
 
@@ -107,16 +106,3 @@ def test_an_emulator_finds_a_noise_that_varies():
         assert np.log(high / low) == pytest.approx(4.0, abs=0.9)
         # the score of five equal heights has five times the variance of one
         assert middle == pytest.approx(5.0 * 0.09, rel=0.4)
-
-
-def test_candidates_are_as_probable_as_they_are_often_true():
-    found = Candidates(noisy_emulators(), np.linspace(-0.95, 0.95, 20)[:, None])
-    truths = np.random.default_rng(10).integers(20, size=400)
-    made = {name: drawn(found.settings[truths], seed) for name, seed in (("a", 11), ("b", 12))}
-    runs = [{name: curves[run] for name, curves in made.items()} for run in range(400)]
-    weights = np.array([found.weights(run) for run in runs])
-    assert weights.sum(axis=1) == pytest.approx(1.0)
-    # of 400 draws a share of .05 is .011 off, and the mean probability of the truth .02
-    rejected = np.mean([found.p_values(run)[true] < 0.05 for run, true in zip(runs, truths, strict=True)])
-    assert rejected == pytest.approx(0.05, abs=0.035)
-    assert weights[np.arange(400), truths].mean() == pytest.approx((weights**2).sum(axis=1).mean(), abs=0.04)

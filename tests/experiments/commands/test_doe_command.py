@@ -167,6 +167,35 @@ def test_the_optimum_of_a_known_bowl() -> None:
     assert near.sum() == pytest.approx(1.2, abs=1e-4)
 
 
+def test_a_curve_gives_back_the_settings_that_made_it() -> None:
+    """Edges of a made-up drum, with noise: steeper with friction, higher with the filling."""
+    factor = ("--factor", "friction=0.2..0.8", "--factor", "fill=0.2..0.4")
+    answered("design", "sobol", *factor, "--runs", 32, "--out", "sobol")
+    runs, places = pd.read_csv("sobol/tables/runs.csv").drop(columns="response"), np.linspace(-40.0, 40.0, 17)
+    rng = np.random.default_rng(3)
+
+    def edge(friction: float, fill: float) -> np.ndarray:
+        return -20.0 * np.tanh(places / (30.0 - 20.0 * friction)) + 60.0 * (fill - 0.3)
+
+    rows = [edge(*row) + rng.normal(0.0, 0.1) for row in runs[["friction", "fill"]].to_numpy()]
+    heights = pd.DataFrame(rows, columns=[f"{place:g}" for place in places])
+    runs.join(heights).to_csv("runs.csv", index=False)
+    seen = edge(0.55, 0.27) + rng.normal(0.0, 0.1, len(places))
+    # half of the places, and from the other side
+    pd.DataFrame({"x": places, "z": seen})[2:13][::-1].to_csv("edge.csv", index=False)
+    words = ("--measured", "edge.csv", "--reading", 0.1, "--alpha", 0.01, "--out", "fit")
+    found = answered("curve", "runs.csv", *words)
+    settings = found["settings"].loc[["friction", "fill"]]
+    assert (settings["low"] < [0.55, 0.27]).all()
+    assert (settings["high"] > [0.55, 0.27]).all()
+    assert (settings["part of the range"] < 0.25).all()
+    # a further measurement beyond the places that were seen: 99 % of it
+    curve = found["curve"]
+    assert curve["measured"].notna().sum() == 11
+    assert ((curve["low"] < edge(0.55, 0.27)) & (edge(0.55, 0.27) < curve["high"])).all()
+    assert Path("fit/plots/curve.png").is_file()
+
+
 def test_columns_of_other_programs_are_not_factors() -> None:
     """Minitab's and Design-Expert's columns of order, decimal commas, an empty response."""
     rows = ["Std;Run;Space Type;A (mm);B;angle"]
@@ -209,6 +238,7 @@ def test_a_title_above_the_names_changes_nothing() -> None:
         ("A,y\n1,2\n2,3\n", ["screen", "--error", "mine"], "error"),
         ("A,y\n1,2\n2,3\n", ["fit", "--alpha", "2"], "--alpha"),
         ("A,y\n1,2\n", ["compare", "--value", "y", "--reference", "y"], "needs different columns, got y, y"),
+        ("A,y\n1,2\n", ["curve", "--measured", "runs.csv", "--reading", "1"], "needs the heights of a curve"),
         ("A,y\n1,2\n2,3\n3,5\n", ["fit", "--model", "A", "--out", "."], "must be a new or an empty folder"),
     ],
 )  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import stats
 
 from doe import compare_means, noise_floor
-from doe.samples.two_errors import TwoErrors
+from doe.samples.two_errors import TwoErrors, false_alarms
 from experiments.evidence.accuracy.statistics.coverage import (
     AT_MOST,
     CHECKED,
@@ -65,7 +65,8 @@ def _compared(sizes: tuple[int, int], ratio: float, number: int) -> Iterator[Fig
 
 def _worst(sizes: tuple[int, int]) -> Figure:
     """Return the largest level of the guarded test over all ratios of the variances, by quadrature."""
-    _, worst = TwoErrors(sizes[0] - 1.0, sizes[1] - 1.0).extreme_levels(0.05)
+    first, second = (size - 1.0 for size in sizes)
+    worst = float(false_alarms(first, second, 0.05, *TwoErrors(first, second).rule(0.05)).max())
     text = f"n = {sizes[0]} and {sizes[1]}, worst ratio (quadrature)"
     return Figure("compare_means, guarded", text, 0.05, AT_MOST, worst, TRIALS)
 

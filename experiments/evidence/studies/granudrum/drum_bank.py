@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 import pandas as pd
 
-from doe.curves.candidates import Candidates
 from doe.curves.curve_emulator import CurveEmulator
+from experiments.evidence.studies.granudrum.candidates import Candidates
 from imaging import DrumReading, PictureError, View, read_drum, read_picture
 
 SPEEDS = (10, 30, 50)
@@ -116,11 +116,6 @@ class DrumBank:
             str(rpm): CurveEmulator.of(x, rows[known], varying=True) for rpm, rows in self.surfaces.items()
         }
         return Candidates(made, coded(GRID))
-
-    @property
-    def places(self) -> np.ndarray:
-        """Numbers in `GRID` of the settings, (settings,)."""
-        return np.ravel_multi_index(tuple(self.levels.T), tuple(COUNTS))
 
     def surfaces_of(self, row: int, without: int = 0) -> dict[str, np.ndarray]:
         """Surfaces of one setting by speed; one speed may be left out."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 
@@ -48,7 +46,7 @@ def forecasts(bank: DrumBank) -> pd.DataFrame:
 
     `known`: from the surface emulated at the true setting, so the noise of the picture and of the emulator.
     """
-    rows, here = [], bank.places
+    rows, here = [], np.ravel_multi_index(tuple(bank.levels.T), tuple(COUNTS))  # numbers in `GRID`
     for row in np.flatnonzero(bank.held_out).tolist():
         for rpm in SPEEDS:
             weights = bank.candidates.weights(bank.surfaces_of(row, without=rpm))
@@ -59,11 +57,6 @@ def forecasts(bank: DrumBank) -> pd.DataFrame:
             miss, known = (float(np.sqrt(np.mean(each**2))) for each in apart)
             rows.append({"rpm": rpm, COHESION_NAME: bank.levels[row, COHESION], "miss": miss, "known": known})
     return pd.DataFrame(rows)
-
-
-def levelled(bank: DrumBank) -> DrumBank:
-    """Return the bank of surfaces at 50 less their mean height: the filling is not compared."""
-    return replace(bank, surfaces={50: bank.surfaces[50] - bank.surfaces[50].mean(axis=1)[:, None]})
 
 
 def compatible(bank: DrumBank, surface: np.ndarray) -> pd.DataFrame:

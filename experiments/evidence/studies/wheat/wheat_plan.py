@@ -23,12 +23,7 @@ SETTINGS = (*GRAIN, *(f"mu_{name}" for name in (*SHELLS, "tube")))
 LEVEL, HEAP, DENSITY = "level", "heap", "density"
 """Data next to the inclined drums, which are named by their shells."""
 
-RESPONSES = {
-    "target": "dynamic_angle",
-    "inclined": "dynamic_angle",
-    "heap": "angle",
-    "bed": "bulk_density",
-}
+RESPONSES = {"target": "dynamic_angle", "inclined": "dynamic_angle", "heap": "angle", "bed": "bulk_density"}
 """Number of each scene of the study."""
 
 POINTS = {

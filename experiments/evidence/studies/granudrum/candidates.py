@@ -6,20 +6,15 @@ emulators themselves show, each predicted from the others (K. L. Lange, R. J. A.
 J. Am. Stat. Assoc. 84 (1989) 881-896).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize, stats
 from scipy.special import gammaln, logsumexp
 
 from doe.curves.curve_emulator import CurveEmulator
-
-Array = NDArray[np.float64]
 
 FREEDOMS = (2.1, 200.0)
 """Degrees of freedom of the tails that a fit may find."""
@@ -27,15 +22,15 @@ FREEDOMS = (2.1, 200.0)
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Settings of a list, as emulators of several conditions predict their curves."""
+    """Coded settings, (candidates, settings), as emulators of several conditions predict their curves."""
 
     emulators: Mapping[str, CurveEmulator]
     """Emulators by condition, made of the same runs in the same order."""
-    settings: Array
-    """Coded settings, shape (candidates, settings)."""
+    settings: np.ndarray
+    _known: dict[tuple[str, ...], tuple[np.ndarray, float]] = field(default_factory=dict)
 
     @cached_property
-    def expected(self) -> dict[str, tuple[Array, Array]]:
+    def expected(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Scores and the variances of one run about them, by condition, both (candidates, components)."""
         found = {}
         for name, emulator in self.emulators.items():
@@ -43,45 +38,33 @@ class Candidates:
             found[name] = means, variances + emulator.noise(self.settings)
         return found
 
-    def squares(self, curves: Mapping[str, Array]) -> Array:
-        """Return generalised least squares of curves by condition, (candidates,)."""
-        correlation, _ = self._tails(tuple(curves))
-        return _squares(
-            np.hstack([self._apart(name, curve)[0] for name, curve in curves.items()]), correlation
-        )
-
-    def log_likelihood(self, curves: Mapping[str, Array]) -> Array:
-        """Return the log-likelihoods of the candidates but for a constant, (candidates,)."""
-        _, freedom = self._tails(tuple(curves))
-        logs = sum(self._apart(name, curve)[1] for name, curve in curves.items())
-        return np.asarray(_log_density(self.squares(curves), self._count(curves), freedom) - logs)
-
-    def weights(self, curves: Mapping[str, Array]) -> Array:
+    def weights(self, curves: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the probabilities of the candidates, all as likely before, (candidates,)."""
-        logs = self.log_likelihood(curves)
+        squares, logs, count, freedom = self._apart(curves)
+        logs = _log_density(squares, count, freedom) - logs
         return np.asarray(np.exp(logs - logsumexp(logs)))
 
-    def p_values(self, curves: Mapping[str, Array]) -> Array:
+    def p_values(self, curves: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the probability that a run of a candidate differs from it by more, (candidates,)."""
-        _, freedom = self._tails(tuple(curves))
-        ratio = self.squares(curves) / self._count(curves) * freedom / (freedom - 2.0)
-        return np.asarray(stats.f.sf(ratio, self._count(curves), freedom))
+        squares, _, count, freedom = self._apart(curves)
+        return np.asarray(stats.f.sf(squares / count * freedom / (freedom - 2.0), count, freedom))
 
-    def curve(self, condition: str, weights: Array) -> Array:
+    def curve(self, condition: str, weights: np.ndarray) -> np.ndarray:
         """Return the expected curve of a condition, weighted over the candidates, (places,)."""
         emulator = self.emulators[condition]
         return np.asarray(emulator.mean + weights @ self.expected[condition][0] @ emulator.components)
 
-    def _count(self, conditions: Mapping[str, Array]) -> int:
-        return sum(len(self.emulators[name].components) for name in conditions)
+    def _apart(self, curves: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, int, float]:
+        """Return generalised least squares, sums of the errors' logarithms, scores, and freedom."""
+        apart, logs = [], np.zeros(len(self.settings))
+        for name, curve in curves.items():
+            emulator, (means, variances) = self.emulators[name], self.expected[name]
+            apart.append(((curve - emulator.mean) @ emulator.components.T - means) / np.sqrt(variances))
+            logs += 0.5 * np.log(variances).sum(axis=1)
+        correlation, freedom = self._tails(tuple(curves))
+        return _squares(np.hstack(apart), correlation), logs, len(correlation), freedom
 
-    def _apart(self, name: str, curve: Array) -> tuple[Array, Array]:
-        """Return scores less the expected ones over their errors, and the sum of the errors' logarithms."""
-        emulator, (means, variances) = self.emulators[name], self.expected[name]
-        apart = (curve - emulator.mean) @ emulator.components.T - means
-        return apart / np.sqrt(variances), 0.5 * np.log(variances).sum(axis=1)
-
-    def _tails(self, conditions: tuple[str, ...]) -> tuple[Array, float]:
+    def _tails(self, conditions: tuple[str, ...]) -> tuple[np.ndarray, float]:
         """Return the correlation of the scores of some conditions, and the freedom of their tails."""
         if conditions not in self._known:
             left_out = np.hstack([self.emulators[name].standard for name in conditions])
@@ -93,16 +76,12 @@ class Candidates:
             self._known[conditions] = correlation, float(found.x)
         return self._known[conditions]
 
-    @cached_property
-    def _known(self) -> dict[tuple[str, ...], tuple[Array, float]]:
-        return {}
 
-
-def _squares(apart: Array, correlation: Array) -> Array:
+def _squares(apart: np.ndarray, correlation: np.ndarray) -> np.ndarray:
     return np.asarray((apart @ np.linalg.inv(correlation) * apart).sum(axis=1))
 
 
-def _log_density(squares: Array, count: int, freedom: float) -> Array:
+def _log_density(squares: np.ndarray, count: int, freedom: float) -> np.ndarray:
     """Return the logarithm of Student's density of variance 1 in some dimensions, at squared distances."""
     ends = gammaln(0.5 * (freedom + count)) - gammaln(0.5 * freedom) - 0.5 * count * np.log(freedom - 2.0)
     return np.asarray(ends - 0.5 * (freedom + count) * np.log1p(squares / (freedom - 2.0)))
