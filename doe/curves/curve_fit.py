@@ -38,7 +38,7 @@ class MeasuredCurve(NamedTuple):
 
 @dataclass(frozen=True)
 class Miss:
-    """Covariance of what a model misses, a smooth function of place and condition."""
+    """Covariance of what a model misses, smooth over places and over coordinates, there of length 1."""
 
     sd: float
     """Standard deviation, in the unit of the curves."""
@@ -46,12 +46,10 @@ class Miss:
     """Correlation length, in the unit of the places."""
     reading: float
     """Standard deviation of the error of one reading, independent from place to place."""
-    reach: float = 1.0
-    """Correlation length over the coordinates of conditions."""
 
     def covariance(self, a: tuple[Array, Array], b: tuple[Array, Array]) -> Array:
         """Return the covariance without the error of reading, between two sets of coordinates and places."""
-        apart = (a[0][:, None] - b[0]) / self.reach, (a[1][:, None] - b[1]) / self.length
+        apart = a[0][:, None] - b[0], (a[1][:, None] - b[1]) / self.length
         return np.asarray(self.sd**2 * np.exp(-0.5 * (apart[0] ** 2 + apart[1] ** 2)))
 
 

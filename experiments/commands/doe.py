@@ -106,7 +106,7 @@ def design(
             "levels": levels, "blocks": blocks, "degree": degree, "seed": seed,
             "model": model if kind == "optimal" else None,
         }  # fmt: skip
-        before = _runs_of(table) if table else None
+        before = _sheet(table, None, []).design if table else None
         factors = [] if before else [read_factor(text) for text in factor or []]
         made = make_design(kind, factors, component or [], before, given)
         answer = describe_design(made, model, sd, effect)
@@ -294,12 +294,6 @@ def _sheet(
     from experiments.commands.tables.sheet import Columns, read_sheet
 
     return read_sheet(table, Columns(factors or [], responses, block, dummies or []))
-
-
-def _runs_of(table: Path) -> Any:
-    from experiments.commands.tables.sheet import Columns, read_sheet
-
-    return read_sheet(table, Columns()).design
 
 
 def _number_or_word(text: str | None) -> float | str | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,6 @@ from experiments.calibrate.plan.knowledge import Size
 from experiments.calibrate.plan.present import Present, fit_responses, known_here, present_of
 from experiments.cases.forecast.work import work_of
 from experiments.io.errors import StudyError
-from experiments.io.texts import enumeration
 from experiments.io.toml_files import read_toml
 from experiments.report.material_card import CARD
 from experiments.report.writer import write_plan
@@ -32,7 +32,7 @@ CENTER, MOST_FACTORS = 5, 5
 """Replicates at the centre of the design, for the noise, and factors of one of at most 31 cases."""
 
 
-CARD_ROUNDING = 1e-3
+ROUNDED = 1e-3
 """Relative difference that values of a card may have by its four digits."""
 
 
@@ -86,17 +86,16 @@ def prepare_plan(study: Study | str | Path, request: RunRequest, after: Path | N
 def _require_grain_of(card: Path, study: Study) -> None:
     """Refuse the card of a campaign with another grain, or with factors that the study lacks."""
     chosen = {name: facts["chosen"] for name, facts in read_toml(card)[1].get("factor", {}).items()}
-    theirs, own = (one.grains for one in (load_card(card).case({}, 0), study.case(chosen, 0)))
-    numbers = {
-        "spheres": lambda grain: grain.sphere_count,
-        "smallest sphere": lambda grain: grain.smallest_sphere,
-        "mass": lambda grain: (
-            grain.material.density * grain.size_mean**3 * grain.mean(lambda shape: shape.volume)
-        ),
-    }
-    apart = [name for name, of in numbers.items() if not np.isclose(of(theirs), of(own), rtol=CARD_ROUNDING)]
-    if apart:
-        problem = f"is of another grain than the study's: {enumeration(apart)} differ"
+    theirs, own = (
+        (
+            one.sphere_count,
+            one.smallest_sphere,
+            one.material.density * one.size_mean**3 * one.mean(attrgetter("volume")),
+        )
+        for one in (load_card(card).case({}, 0).grains, study.case(chosen, 0).grains)
+    )
+    if not np.allclose(own, theirs, rtol=ROUNDED, atol=0.0):
+        problem = "is of a grain with another shape, size or density than the study's"
         raise StudyError(str(card), problem, hint="Name a campaign of this grain, or plan without --after.")
 
 

@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from doe import Category, plots
 from doe.curves.curve_emulator import CurveEmulator
 from doe.curves.curve_fit import MeasuredCurve, fit_curves
+from doe.plots.style import canvas, plain
 from experiments.commands.tables.answers import Answer
 from experiments.commands.tables.sheet import Columns, Sheet, read_columns, read_frame, read_sheet
 from experiments.io.errors import InputError
 from experiments.io.texts import is_number
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def read_curves(path: Path, factors: Sequence[str]) -> Sheet:
@@ -78,14 +76,11 @@ def fit_curve(
 
 
 def _drawn(curve: pd.DataFrame) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(plots.WIDTH, 3.8), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = canvas(None, 3.8)
     axes.fill_between(curve.index, curve["low"], curve["high"], color=plots.BLUE, alpha=0.2, linewidth=0.0)
     axes.plot(curve.index, curve["expected"], color=plots.BLUE, label="expected")
     axes.plot(curve.index, curve["measured"], "o", color=plots.VERMILION, label="measured")
     axes.set(xlabel="place", ylabel="height")
-    axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False)
+    plain(axes)
     return figure

@@ -99,7 +99,7 @@ def test_a_plan_after_a_campaign_takes_its_region(
     grain, name = ('sphere = "2 mm"\ndensity = "700', 'name = "E"')
     other, renamed = (grain, 'sphere = "3 mm"\ndensity = "900'), (name, 'name = "friction"')
     said = refused("plan", write_study(other, add=CANDIDATES), "--after", campaign)
-    assert "is of another grain than the study's: smallest sphere and mass differ" in said
+    assert "is of a grain with another shape, size or density" in said
     candidates = CANDIDATES.replace('parameter = "E"', 'parameter = "friction"')
     said = refused("plan", write_study(renamed, add=candidates), "--after", campaign)
     assert "must name a factor" in said
