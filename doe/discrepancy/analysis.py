@@ -17,7 +17,7 @@ from doe.discrepancy.contest.fresh_runs import FreshRuns, Request
 from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, Question, find_gap
 from doe.discrepancy.contest.held_out import held_out_gain
 from doe.discrepancy.contest.power import Effects, powers, shown_apart
-from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
+from doe.discrepancy.contest.rivals import certain, is_open, lag, needed, parting
 from doe.discrepancy.contest.rounds import CandidateModel, CandidateModels, simulate_again
 from doe.discrepancy.contest.signatures import Signatures, signatures
 from doe.discrepancy.contest.slips import find_slips, without
@@ -37,10 +37,11 @@ from doe.discrepancy.verdict.conclusion import (
     conclude_with_two,
     explained_share,
     objections,
+    rival,
     withdrawn,
 )
 from doe.discrepancy.verdict.discovery import Confounding, Discovery, Effort, Gap, Verdict
-from doe.discrepancy.verdict.next_experiment import NextExperiment, propose
+from doe.discrepancy.verdict.next_experiment import NextExperiment, Rival, propose
 from doe.numerics.one_thread import in_one_thread, steps_in_one_thread
 
 Analysis = Generator[list[Point], Outcomes, Discovery]
@@ -323,7 +324,7 @@ class _Parts:
     ) -> NextExperiment | None:
         """Propose an experiment for the two best explanations, or for the best one and the base.
 
-        In a tie both are of the tie. Two rejected models are not worth a measurement.
+        In a tie it is for all of the tie. Two rejected models are not worth a measurement.
         """
         if conclusion.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
             return None
@@ -332,13 +333,17 @@ class _Parts:
             ordered.sort(key=lambda one: bool(objections(one, self.settings)))
             if objections(ordered[0], self.settings):
                 return None
-        ranked = [one.fitted for one in ordered]
+        margin, others = self.settings.tie_margin, ordered[1:2]
         if conclusion.verdict is Verdict.TIE:
-            ranked = [one for one in ranked if set(one.mechanisms) <= set(conclusion.named)]
-        second = ranked[1] if len(ranked) > 1 else base.fitted
+            ordered = [one for one in ordered if one.mechanisms in [(name,) for name in conclusion.named]]
+            others = ordered[1:]
+        best = ordered[0]
+        rivals = [rival(one, best, margin) for one in others]
+        if not rivals:
+            whole, limit = self.whole(base.fitted), needed(math.inf, margin)
+            rivals = [Rival(whole, base.fitted.score - best.score, limit, parting(whole, best.whole))]
         most = max(int(np.max(block.replicates)) for block in self.evidence.training)
-        wanted = telling_apart(self.settings.tie_margin, self.settings.power)
-        return propose(ranked[0], second, most, wanted)
+        return propose(best.whole, rivals, most, self.settings.power)
 
 
 def _empty(

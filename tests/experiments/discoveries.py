@@ -214,8 +214,7 @@ def made_discovery(verdict: Verdict) -> Discovery:
         if named
         else (),
         next_experiment=NextExperiment(
-            "wide", (("scene.lifted-cylinder.diameter", "44 mm"),), ("contact_adhesion", "liquid_bridges"),
-            23.0, 8, "t55", 20.0,
+            ("wide",), ("contact_adhesion", "liquid_bridges"), 23.0, 8, "t55", 0.84, 0.8
         )
         if named
         else None,

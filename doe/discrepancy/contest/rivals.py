@@ -9,39 +9,47 @@ import math
 
 import numpy as np
 from scipy import stats
+from scipy.special import expit
 
 from doe.discrepancy.contest.signatures import projector
 from doe.discrepancy.fitting.model_fit import Fitted
 
 CHANCE = 1.645
 """Standard deviations that a normal number passes upwards in one case of twenty."""
+LEAST_CHANCE = 1e-9
+"""Variance of a lag below which nothing is left to chance."""
 
 
 def is_open(behind: float, apart: float, margin: float, parting: float = 0.0) -> bool:
-    """Return True if it is open which of two models is right, given how far one is behind in Q.
+    """Return True if it is open which of two models is right, given how far one is behind in Q (`needed`)."""
+    return behind < needed(apart, margin, parting)
+
+
+def needed(apart: float, margin: float, parting: float = 0.0) -> float:
+    """Compute how far a model must be behind in Q so that the other is right.
 
     Of models d standard deviations apart (``apart`` = d^2; infinite for several mechanisms) the wrong one is
     behind by d^2 +- 2 d. Two that look the same, with d^2 below the margin, are distinguished where chance
     does so in at most one case of twenty. The right one is behind by -d^2 +- (4 d^2 + parting^2)^.5; where
     that passes the margin in more than one case of twenty, the margin grows accordingly.
     """
-    needed = _margin_of_alike(margin) if apart < margin else margin
+    alike = margin + 2.0 * CHANCE * margin**0.5
+    least = alike if apart < margin else margin
     if math.isfinite(apart):
-        needed = max(needed, CHANCE * (4.0 * apart + parting**2) ** 0.5 - apart)
-    return behind < needed
+        least = max(least, CHANCE * (4.0 * apart + parting**2) ** 0.5 - apart)
+    return least
 
 
-def _margin_of_alike(margin: float) -> float:
-    return margin + 2.0 * CHANCE * margin**0.5
+def settling(behind: float, gain: float, needed: float, parting: float) -> float:
+    """Compute the probability that further data settle which of two models is right.
 
-
-def telling_apart(margin: float, power: float) -> float:
-    """Compute the Q between two models at which they are distinguished with a power (`is_open`).
-
-    The wrong one is behind by d^2 +- 2 d, which passes the margin of models that look the same.
+    If both were equally likely before, the odds are exp(behind / 2) for the best one. Data in which the two
+    are d standard deviations further apart (``gain`` = d^2) bring the right one ahead by
+    d^2 +- (4 d^2 + parting^2)^.5: the next search has fresh runs of its own.
     """
-    z = float(stats.norm.ppf(power))
-    return float((z + (z**2 + _margin_of_alike(margin)) ** 0.5) ** 2)
+    right, sd = expit(behind / 2.0), max(4.0 * gain + parting**2, LEAST_CHANCE) ** 0.5
+    of_best, of_other = stats.norm.cdf((gain - needed + np.array([behind, -behind])) / sd)
+    return float(right * of_best + (1.0 - right) * of_other)
 
 
 def lag(score: float, sure: float, margin: float) -> float:

@@ -7,15 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from doe.discrepancy.contest.gap import Answer, GapTest, Question
-from doe.discrepancy.contest.rivals import certain, is_open, lag, parting
+from doe.discrepancy.contest.rivals import certain, lag, needed, parting
 from doe.discrepancy.fitting.model_fit import Fitted, Interval
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.before_after import BeforeAfter
 from doe.discrepancy.verdict.discovery import Verdict
+from doe.discrepancy.verdict.next_experiment import Rival
 
-WORSE = 4.0
-"""Rise of the held-out Q of fresh runs with which a name is withdrawn: two standard deviations, squared
-(``trials/record/sixth``)."""
+WORSE = 2.0
+"""Standard deviations of the difference of two Qs beyond which fresh runs withdraw a name
+(``trials/record/README.md``)."""
 
 LIKELIHOOD = "minus twice the log-likelihood, held-out conditions included"
 """Name of a score, in reasons."""
@@ -106,11 +107,8 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
     order = sorted(range(len(assessments)), key=lambda index: assessments[index].score)
     best = assessments[order[0]]
     margin = settings.tie_margin
-    sure = certain(best.whole)
-    # rivals that fit were run; the emulator's error at the others is large
-    known = [certain(one.whole) - sure if one.simulated else math.inf for one in assessments]
-    by = [lag(one.score - best.score, at, margin) for one, at in zip(assessments, known, strict=True)]
-    close = [i for i in order if _is_close(assessments[i], best, by[i], margin)]
+    rivals = [rival(one, best, margin) for one in assessments]
+    close = [i for i in order if assessments[i] is best or rivals[i].behind < rivals[i].needed]
     passing = [i for i in close if not objections(assessments[i], settings)]
     failed = objections(best, settings)
     titles = ", ".join(_title(assessments[i]) for i in close)
@@ -118,7 +116,7 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
         if len(best.mechanisms) > 1:
             return Conclusion(Verdict.UNKNOWN, (), open_pairs([assessments[i] for i in close]), None)
         names = tuple(assessments[i].mechanisms[0] for i in close)
-        most = max(by[i] for i in close)
+        most = max(rivals[i].behind for i in close)
         reason = (
             f"{titles} explain the data alike: at most {most:.1f} apart as ties are judged, in {LIKELIHOOD}"
         )
@@ -173,18 +171,28 @@ def _unexplained(
     return of_two if len(closest.mechanisms) > 1 else of_one
 
 
-def _is_close(one: Assessment, best: Assessment, behind: float, margin: float) -> bool:
+def rival(one: Assessment, best: Assessment, margin: float) -> Rival:
+    """Compare an assessment with the best one."""
+    # rivals that fit were run; the emulator's error at the others is large
+    sure = certain(one.whole) - certain(best.whole) if one.simulated else math.inf
     apart = best.apart.get(one.mechanisms[0], math.inf)
-    return one is best or is_open(behind, apart, margin, parting(one.whole, best.whole))
+    chance = parting(one.whole, best.whole)
+    return Rival(one.whole, lag(one.score - best.score, sure, margin), needed(apart, margin, chance), chance)
 
 
 def withdrawn(conclusion: Conclusion, compared: Sequence[BeforeAfter]) -> Conclusion:
-    """Withdraw a name or a tie whose fresh runs predict held-out conditions worse than the base's do."""
+    """Withdraw a name or a tie whose fresh runs predict held-out conditions worse than the base's do.
+
+    The noise of the measured means is in both Qs, that of the fresh runs in one each. Of two models that are
+    equally good the scores of a mean, of as many heaps as runs, correlate by 1/2: their squares differ with a
+    variance of 2 + 2 - 4 (1/2)^2 = 3.
+    """
     for one in compared:
-        if one.held_out and (worse := one.after.value - one.before.value) > WORSE:
+        limit = WORSE * math.sqrt(3.0 * one.degrees_of_freedom)
+        if one.held_out and (worse := one.after.value - one.before.value) > limit:
             reason = (
                 f"fresh runs with {', '.join(map(_spaced, conclusion.named))} predict the held-out conditions"
-                f" worse than those of the base: Q rises by {worse:.1f}"
+                f" worse than those of the base: Q rises by {worse:.1f}, limit {limit:.1f}"
             )
             return Conclusion(Verdict.UNKNOWN, (), reason, None)
     return conclusion

@@ -1,81 +1,124 @@
-"""The experiment that distinguishes two models best (Hunter and Reiner 1965; Box and Hill 1967)."""
+"""The experiment that distinguishes models best (Hunter and Reiner 1965; Box and Hill 1967)."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
+from doe.discrepancy.contest.rivals import settling
 from doe.discrepancy.contest.signatures import projector
 from doe.discrepancy.fitting.fitted_model import Stack
 from doe.discrepancy.fitting.measured_means import Block
-from doe.discrepancy.fitting.model_fit import Fitted, whiten
+from doe.discrepancy.fitting.model_fit import Fitted, weigh
 
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """Condition that would settle the verdict best."""
+    """Conditions whose repetition would settle the verdict best."""
 
-    condition: str
-    changes: tuple[tuple[str, str], ...]
-    """Settings that differ from the first: place and value."""
+    conditions: tuple[str, ...]
     separates: tuple[str, str]
     """Two models, each a mechanism's name or "base"."""
     expected_q: float
-    """Q between the two, each refitted, with ``replicates`` measurements."""
+    """Expected distance of the second behind the first, if the first is right, in minus twice the
+    log-likelihood of all measurements."""
     replicates: int
+    """Further measurements under each of the conditions."""
     observable: str
     """The observable that differs most."""
-    wanted_q: float
-    """Q between the two that distinguishes them."""
+    chance: float
+    """Probability that all measurements together distinguish the models (`rivals.settling`)."""
+    power: float
+    """Probability from which on the experiment is expected to."""
 
     @property
     def settles(self) -> bool:
-        """True if the experiment can be expected to distinguish the two."""
-        return self.expected_q >= self.wanted_q
+        """True if the experiment can be expected to distinguish the models."""
+        return self.chance >= self.power
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Model that may be right in place of the best one."""
+
+    fitted: Fitted
+    """Weighed on all conditions."""
+    behind: float
+    """Its distance behind the best (`rivals.lag`)."""
+    needed: float
+    """The distance from which on it is no rival (`rivals.needed`)."""
+    parting: float
+    """Standard deviation of their distance by the errors of the predictions (`rivals.parting`)."""
 
 
 TIMES = (1, 2, 4, 8)
 """Multiples of the measured replicates that are tried: beyond them the emulator's error remains."""
 
 
-def propose(first: Fitted, second: Fitted, replicates: int, wanted_q: float) -> NextExperiment:
-    """Choose the condition whose repetition separates two fitted models by most, the second refitted.
+def propose(first: Fitted, rivals: Sequence[Rival], replicates: int, power: float) -> NextExperiment:
+    """Choose what to repeat: the fewest measurements that tell a model from its rivals with a power.
 
-    It is repeated as often as it was measured, or two, four or eight times as often where only that
-    distinguishes them, i.e. where Q reaches ``wanted_q``. The expected Q is that of the means that the first
-    predicts, fitted by the second (linearised) in the old conditions and the new one together. ``changes``
-    stays empty: the caller defined the conditions.
+    One condition is repeated, or every condition, as often as it was measured, or two, four or eight times as
+    often; the last where nothing is enough. Further heaps join those of their condition: they have the same
+    errors of instruments and emulator.
     """
-    tried = (_best(first, second, times * replicates, wanted_q) for times in TIMES)
-    last = next(tried)
-    for each in tried:
-        if last.settles:
+    names = first.model.emulator.space.conditions
+    plans = [(times * replicates, some) for some in (*((name,) for name in names), names) for times in TIMES]
+    plans.sort(key=lambda plan: plan[0] * len(plan[1]))
+    for _, alike in groupby(plans, key=lambda plan: plan[0] * len(plan[1])):
+        steps = [_step(first, rivals, *plan, power) for plan in alike]
+        best = max(steps, key=lambda step: (step.chance, step.expected_q))
+        if best.settles:
             break
-        last = each
-    return last
+    return best
 
 
-def _best(first: Fitted, second: Fitted, replicates: int, wanted_q: float) -> NextExperiment:
-    """Choose the condition for a number of measurements."""
-    emulator, tried = first.model.emulator, []
-    for condition in emulator.space.conditions:
-        block = Block.of_runs(condition, np.arange(len(emulator.observables)), replicates)
-        expected, contrast = _separation(first, second, block)
-        tried.append((expected, condition, emulator.observables[int(np.argmax(np.abs(contrast)))]))
-    expected, condition, observable = max(tried, key=lambda one: one[0])
-    titles = (_title(first), _title(second))
-    return NextExperiment(condition, (), titles, expected, replicates, observable, wanted_q)
+def _step(
+    first: Fitted, rivals: Sequence[Rival], more: int, conditions: tuple[str, ...], power: float
+) -> NextExperiment:
+    """Forecast what further measurements of some conditions give, against the rival that they tell least."""
+    found = []
+    for rival in rivals:
+        old = rival.fitted.stack.blocks
+        after, observable = _distance(first, rival.fitted, _joined(old, conditions, more), conditions)
+        gain = max(after - _distance(first, rival.fitted, old, conditions)[0], 0.0)
+        chance = settling(rival.behind, gain, rival.needed, rival.parting)
+        pair = _title(first), _title(rival.fitted)
+        step = NextExperiment(conditions, pair, rival.behind + gain, more, observable, chance, power)
+        found.append(step)
+    return min(found, key=lambda step: step.chance)
 
 
-def _separation(first: Fitted, second: Fitted, block: Block) -> tuple[float, np.ndarray]:
-    """Return the expected Q, and the new condition's differences in standard deviations."""
-    blocks = (*second.stack.blocks, block)
-    stack = Stack(second.model, blocks)
-    whitening = whiten(stack.covariance(second.x))
-    difference = Stack(first.model, blocks).predict(first.x[None])[0] - stack.predict(second.x[None])[0]
-    slopes = whitening @ stack.jacobian(second.x[None])[0]
-    left = projector(slopes) @ whitening @ difference
-    new = slice(len(difference) - len(block.mean), None)
-    return float(left @ left), difference[new] / np.sqrt(np.diag(stack.covariance(second.x)))[new]
+def _joined(blocks: tuple[Block, ...], conditions: Sequence[str], more: int) -> tuple[Block, ...]:
+    """Return the means of all conditions, with further replicates of some."""
+    columns = np.unique(np.concatenate([block.columns for block in blocks]))
+    old = [
+        replace(block, share=block.share / (1.0 + more / block.replicates.max()))
+        if block.condition in conditions
+        else block
+        for block in blocks
+    ]
+    known = {block.condition for block in blocks}
+    return (*old, *(Block.of_runs(name, columns, more) for name in conditions if name not in known))
+
+
+def _distance(
+    first: Fitted, second: Fitted, blocks: tuple[Block, ...], conditions: Sequence[str]
+) -> tuple[float, str]:
+    """Return Q of what the first predicts, fitted by the second (linearised), and where they differ most.
+
+    The errors of both predictions are in their difference, and make Q larger: that part is taken off.
+    """
+    ahead, weighed = Stack(first.model, blocks), weigh(Stack(second.model, blocks), second.x)
+    difference = ahead.predict(first.x[None])[0] - weighed.stack.predict(second.x[None])[0]
+    metric = projector(weighed.sensitivities) @ weighed.whitening
+    errors = ahead.open_error(first.x) + weighed.stack.open_error(second.x)
+    q = np.sum((metric @ difference) ** 2) - np.sum(metric.T @ metric * errors)
+    there = np.concatenate([np.full(len(block.mean), block.condition in conditions) for block in blocks])
+    most = np.argmax(np.abs(difference) / np.sqrt(np.diag(weighed.covariance)) * there)
+    column = np.concatenate([block.columns for block in blocks])[most]
+    return float(q), second.model.emulator.observables[column]
 
 
 def _title(fitted: Fitted) -> str:

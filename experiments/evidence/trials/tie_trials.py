@@ -4,13 +4,15 @@
     python -m experiments.evidence.trials.tie_trials --count 10 --table out/ties.csv
 
 The world is that of `slip_trials`; the search has a bank that is drawn from it, and fresh runs. Where it ends
-in a tie, each condition is repeated in turn, in as many heaps as the search proposes, and searched again.
+in a tie, each condition is repeated in turn, or every condition, in as many heaps in all as the search
+proposes, and searched again.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import combinations, count, islice
+from itertools import combinations, count, islice, pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +22,7 @@ import typer
 
 from doe.discrepancy import Discovery, Emulator, Measured, Verdict, analyse, drive, fit_emulator
 from doe.discrepancy.fitting.model_fit import Fitted
-from doe.discrepancy.verdict.next_experiment import TIMES, propose
+from doe.discrepancy.verdict.next_experiment import TIMES
 from experiments.evidence.record_page import markdown_table
 from experiments.evidence.trials.baselines.emulated_world import (
     REPLICATES,
@@ -38,8 +40,9 @@ HIDDEN, SIZES = ("contact_adhesion", "liquid_bridges", "rolling_torque"), (0.1, 
 """Effects that tie with one another, and coded sizes at which they do."""
 OUTCOMES = ("the truth", "a tie", "unknown", "nothing", "a wrong name")
 """Answers after the repetition, the best first."""
-SEARCH, RANDOM = "the search", "random"
-CHOICES = (SEARCH, "the same, bank alone", "2604.01231", RANDOM)
+SEARCH, RANDOM, EVERY = "the search", "random", "every condition"
+CHOICES = (SEARCH, "2604.01231", RANDOM)
+FORECASTS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.01)
 
 
 @cache
@@ -54,13 +57,14 @@ def heaps_of(number: int) -> tuple[Measured, str, float]:
     space, rng = truth.emulator.space, np.random.default_rng([number, 4])
     theta, hidden = rng.uniform(space.lower, space.upper).tolist(), HIDDEN[number % len(HIDDEN)]
     size = space.natural_size(hidden, rng.uniform(*SIZES))
-    most = (1 + TIMES[-1]) * REPLICATES
+    most = (1 + TIMES[-1] * len(space.conditions)) * REPLICATES
     return emulated_heaps(truth, theta, {hidden: size}, most, number, settings.systematic), hidden, size
 
 
-def searched(heaps: Measured, number: int, condition: str = "", more: int = 0) -> tuple[Problem, Discovery]:
-    """Search the first heaps of every condition, and more of one."""
-    counts = {name: REPLICATES + more * (name == condition) for name in heaps.conditions}
+def searched(heaps: Measured, number: int, repeated: str = "", more: int = 0) -> tuple[Problem, Discovery]:
+    """Search the first heaps of every condition, and more of one, or as many more of all together."""
+    share = math.ceil(more / len(heaps.conditions)) * (repeated == EVERY)
+    counts = {name: REPLICATES + (more if name == repeated else share) for name in heaps.conditions}
     values = {name: rows[: counts[name]] for name, rows in heaps.values.items()}  # noqa: PD011
     seen, settings = replace(heaps, values=values, reasons={}), true_world()[1]
     problem = Problem(str(number), bank_of(number % BANKS), seen, settings, number)
@@ -93,14 +97,15 @@ def ties(start: int) -> Iterator[dict[str, object]]:
         step = found.next_experiment
         if found.verdict is not Verdict.TIE or step is None:
             continue
-        models = sorted((problem.fitted((name,)) for name in found.named), key=lambda one: one.score)
-        on_bank = propose(models[0], models[1], step.replicates, wanted_q=0.0).condition
+        models = [problem.fitted((name,)) for name in found.named]
+        proposed = step.conditions[0] if len(step.conditions) == 1 else EVERY
+        heaps_more = step.replicates * len(step.conditions)
         drawn = str(np.random.default_rng([number, 5]).choice(heaps.conditions))
         farthest = max(heaps.conditions, key=lambda name: contrast(models, name))
-        again = {c: searched(heaps, number, c, step.replicates)[1] for c in heaps.conditions}
+        again = {c: searched(heaps, number, c, heaps_more)[1] for c in (*heaps.conditions, EVERY)}
         row = {"twin": number, "hidden": hidden, "size": f"{size:.4g}", "tied": " ".join(found.named)}
-        row |= {"heaps": step.replicates, "expected": step.settles}
-        row |= dict(zip(CHOICES, (step.condition, on_bank, farthest, drawn), strict=True))
+        row |= {"heaps": heaps_more, "chance": f"{step.chance:.3f}"}
+        row |= dict(zip(CHOICES, (proposed, farthest, drawn), strict=True))
         yield row | {name: outcome(one, hidden) for name, one in again.items()}
 
 
@@ -121,10 +126,12 @@ def compared(table: pd.DataFrame) -> pd.DataFrame:
         rows[-1] |= {one: str((end == one).sum()) for one in OUTCOMES[1:]}
         rows[-1]["the search more, % (se)"] = f"{gap.mean():+.0f} ({gap.sem():.1f})"
         rows[-1]["only the search : only it"] = str(paired(own, right))
-    settled = own.groupby(table["expected"].map({True: "expected to settle", False: "not expected to"}))
-    for word, each in settled:
+    for low, high in pairwise(FORECASTS):
+        among = (table["chance"] >= low) & (table["chance"] < high)
+        each, mean = own[among], 100 * table["chance"][among].mean()
         share = f"{100 * each.mean():.0f} ({100 * each.sem():.1f})"
-        rows.append({"condition": f"{word}: {len(each)}", "the truth alone, % (se)": share})
+        words = f"forecast {100 * low:.0f} to {100 * high:.0f} %, {mean:.0f} on average: {len(each)}"
+        rows += [{"condition": words, "the truth alone, % (se)": share}] if len(each) else []
     return pd.DataFrame(rows).fillna("")
 
 

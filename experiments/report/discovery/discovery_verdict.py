@@ -122,13 +122,15 @@ def next_step(found: Discovery, terms: Terms) -> str:
         "the base" if name == "base" else f"the model with {terms.titles(name.split(BOTH))}"
         for name in step.separates
     )
-    expected = say("verdict.expected", q=trimmed(step.expected_q, 3))
-    shared = {"pair": pair, "tests": step.replicates, "expected": expected}
+    shared = {"pair": pair, "tests": step.replicates, "setting": _setting(step.conditions)}
+    shared |= {"share": percent(step.chance), "q": trimmed(step.expected_q, 3)}
     if not step.settles:
-        return say("verdict.cannot_settle", **shared, wanted=trimmed(step.wanted_q, 3))
-    how = ", ".join(f"{place} = {value}" for place, value in step.changes)
-    setting = f"“{step.condition}”" + (f" ({how})" if how else "")
-    return say("verdict.repeat", **shared, setting=setting, observable=spaced(step.observable))
+        return say("verdict.cannot_settle", **shared)
+    return say("verdict.repeat", **shared, observable=spaced(step.observable))
+
+
+def _setting(conditions: tuple[str, ...]) -> str:
+    return f"the condition “{conditions[0]}”" if len(conditions) == 1 else "each condition"
 
 
 def _none(found: Discovery, terms: Terms) -> str:
@@ -261,8 +263,7 @@ def _settle_by_experiment(found: Discovery, terms: Terms, settings: Settings) ->
     if step is None:
         return
     if step.settles:
-        tests = f"{step.replicates} more tests under the condition “{step.condition}”"
-        yield say("verdict.would_settle", tests=capital(tests))
+        yield say("verdict.would_settle", tests=step.replicates, setting=_setting(step.conditions))
         return
     yield say("verdict.no_condition", tests=step.replicates)
     both = [name for model in step.separates for name in model.split(BOTH)]

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from synthetic_world import emulator, measure
 
-from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
+from doe.discrepancy import BeforeAfter, Interval, Verdict
+from doe.discrepancy.contest.rivals import certain, is_open, lag, needed, parting, settling
 from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import gather
 from doe.discrepancy.fitting.model_fit import fit, whiten
 from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.conclusion import closest_first, open_pairs
+from doe.discrepancy.verdict.conclusion import Conclusion, closest_first, open_pairs, withdrawn
 
 MARGIN = 6.0
 DRAWS = 100_000
@@ -85,13 +86,34 @@ def test_a_model_gains_nothing_by_what_is_open_of_it_nor_by_scatter_that_nobody_
     assert certain(wider) > certain(fitted) + np.linalg.slogdet(4.0 * np.eye(len(wide)))[1] - fitted.q
 
 
-def test_models_that_far_apart_are_told_apart_with_the_power() -> None:
-    rng = np.random.default_rng(2)
-    distance = telling_apart(MARGIN, 0.8) ** 0.5
-    # the wrong one is behind by the squared distance and twice the distance times a normal number
-    behind = distance**2 + 2.0 * distance * rng.standard_normal(DRAWS)
-    apart = np.mean([not is_open(value, 0.0, MARGIN) for value in behind])
-    assert apart == pytest.approx(0.8, abs=4.0 * (0.8 * 0.2 / DRAWS) ** 0.5)
+@pytest.mark.parametrize(("behind", "gain"), [(0.0, 30.0), (6.0, 12.0), (9.0, 0.0)])
+def test_further_data_settle_which_model_is_right_as_often_as_forecast(behind: float, gain: float) -> None:
+    rng, limit = np.random.default_rng(2), needed(0.0, MARGIN)
+    # the lag of the wrong one in ten further means with unit noise; and the errors of new runs
+    means, own = np.full(10, (gain / 10.0) ** 0.5), 3.0
+    right = rng.random(DRAWS) < 1.0 / (1.0 + np.exp(-behind / 2.0))
+    noise = rng.standard_normal((DRAWS, 10))
+    ahead = ((noise + means) ** 2 - noise**2).sum(axis=1) + own * rng.standard_normal(DRAWS)
+    settled = np.mean(np.where(right, behind, -behind) + ahead >= limit)
+    # four standard errors of a share, at most
+    assert settled == pytest.approx(settling(behind, gain, limit, own), abs=4.0 * 0.5 / DRAWS**0.5)
+
+
+def test_fresh_runs_withdraw_the_right_name_by_chance_in_one_case_of_forty() -> None:
+    rng, means, heaps = np.random.default_rng(5), 13, 8
+    # a mechanism that does nothing in the held-out conditions: measured means and those of two sets of runs
+    measured, *runs = rng.standard_normal((3, DRAWS, means)) / heaps**0.5
+    base, named = ((measured - one) / (2.0 / heaps) ** 0.5 for one in runs)
+    rises = (named**2).sum(axis=1) - (base**2).sum(axis=1)
+    # the standard error from n draws is sqrt((k - 1) / (4 n)) of it, with the kurtosis k = 3.5; four of them
+    assert rises.std() == pytest.approx((3.0 * means) ** 0.5, rel=4.0 * (2.5 / 4.0 / DRAWS) ** 0.5)
+    name, lost = Conclusion(Verdict.NAMED, ("alpha",), "", 0), 0
+    for rise in rises[:4000]:
+        before, after = Interval(0.0, 50.0, 99.0), Interval(0.0, 50.0 + rise, 99.0)
+        one = BeforeAfter(True, means, before, after, Interval(-1.0, 0.0, 1.0), heaps)
+        lost += withdrawn(name, [one]).verdict is Verdict.UNKNOWN
+    # 2.3 % beyond two standard deviations if normal, 2.5 % with these tails; four standard errors
+    assert lost / 4000 == pytest.approx(0.025, abs=4.0 * (0.025 * 0.975 / 4000) ** 0.5)
 
 
 def test_what_comes_closest_was_run_and_a_second_effect_brings_more_than_a_little() -> None:

@@ -119,6 +119,7 @@ def test_mechanisms_that_act_alike_are_a_tie_with_an_experiment_to_follow() -> N
     assert set(found.next_experiment.separates) == {"alpha", "twin"}
     # one part in a hundred apart: no number of heaps of these conditions tells them
     assert not found.next_experiment.settles
+    assert found.next_experiment.conditions == found.data.conditions
     assert found.next_experiment.replicates == 8 * int(found.data.replicates.max())
 
 

@@ -23,7 +23,6 @@ from doe.discrepancy.fitting.fitted_model import Model, Stack
 from doe.discrepancy.fitting.measured_means import gather
 from doe.discrepancy.fitting.model_fit import Fitted, fit, weigh
 from doe.discrepancy.fitting.size_interval import coded_size_interval
-from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
 from doe.discrepancy.verdict.records import calibration_uses
 from experiments.discover.search import Search
 from experiments.measurement.instrument_error import usual_error
@@ -236,14 +235,6 @@ def test_a_forecast_takes_over_what_the_fit_shows_to_be_off() -> None:
         column = list(held_out[0].columns).index(known().observables.index("t55"))
         missed.append(abs(found.measured - found.predicted)[column])
     assert missed[1] < 0.01 < missed[0]
-
-
-def test_fresh_runs_that_come_out_worse_withdraw_a_name() -> None:
-    named = Conclusion(discrepancy.Verdict.NAMED, ("plate_tilt",), "", 0)
-    for worse, verdict in ((3.0, discrepancy.Verdict.NAMED), (5.0, discrepancy.Verdict.UNKNOWN)):
-        before, after = discrepancy.Interval(8.0, 10.0, 12.0), discrepancy.Interval(8.0, 10.0 + worse, 18.0)
-        compared = discrepancy.BeforeAfter(True, 12, before, after, discrepancy.Interval(-1.0, -0.5, 0.0), 8)
-        assert withdrawn(named, [compared]).verdict is verdict
 
 
 def test_without_a_tilt_every_lean_is_noise() -> None:

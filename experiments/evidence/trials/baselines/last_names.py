@@ -4,9 +4,11 @@
     python -m experiments.evidence.trials.baselines.last_names out/record/eighth out/record/ninth
 
 The first takes the kept series and the emulated trials, the second records of earlier series, out of the
-history of the repository. The reason of a verdict has the first rule that failed, and the best model.
+history of the repository. The reason of a verdict has the first rule that failed, and the best model. Fresh
+runs that forecast worse withdrew a name from a rise of Q by 4 on: they are judged by the limit of today.
 """
 
+import math
 import re
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +17,7 @@ import pandas as pd
 import typer
 
 from doe.discrepancy import Verdict, analyse, drive
+from doe.discrepancy.verdict.conclusion import WORSE
 from experiments.evidence.record_page import markdown_table
 from experiments.evidence.trials import findings
 from experiments.evidence.trials.baselines import benchmark_files as benchmark
@@ -28,6 +31,7 @@ from experiments.evidence.trials.truths import STRONG
 RECORD = Path(__file__).parents[1] / "record"
 EMULATED = RECORD / "baselines"
 OTHERS = ("Bayes factors", "BIC", "sbi")
+WITHDRAWN = "its fresh runs forecast worse"
 CLOSEST = "^(.*) comes closest, but "
 RULES = {
     "no alarm": "^(?:the calibrated model agrees|fresh runs at the optimum agree)()",
@@ -36,13 +40,13 @@ RULES = {
     "the data still disagree": f"{CLOSEST}the data still disagree",
     "its size is too few errors": f"{CLOSEST}its size",
     "it forecasts no better": f"{CLOSEST}it predicts",
-    "its fresh runs forecast worse": "^fresh runs with (.*) predict",
+    WITHDRAWN: "^fresh runs with (.*) predict",
     "declared not resolvable": f"{CLOSEST}(?:it was declared|by declaration)",
     "several pairs fit": "^no one pair stands out: (.*)",
 }
 """Beginnings of reasons by rule; the group is the best model, or the models of a tie, best first."""
-LIMITS = (4.0, 8.0, 12.0, 16.0)
-"""Rises of Q of the held-out conditions, by fresh runs, from which on a name would be withdrawn."""
+LIMITS = (0.5, 1.0, 1.5, WORSE)
+"""Rises of Q of the held-out conditions, by fresh runs, over their standard deviation by chance."""
 
 
 def stopped(reason: str) -> tuple[str, set[str]]:
@@ -74,6 +78,8 @@ def verdicts(record: Path) -> pd.DataFrame:
     table = table[table["view"] != findings.PHOTOGRAPHS].assign(series=record.name)
     for row in table.itertuples():
         label, (rule, best) = truths[row.trial], stopped(row.reason)
+        chance = (row.held_out_after - row.held_out_before) / math.sqrt(3.0 * row.held_out_degrees)
+        rule = "" if rule == WITHDRAWN and chance <= WORSE else rule
         best = set(row.named.split()) if row.verdict == Verdict.NAMED else best
         known = set(label.mechanisms) if label.kind in (Kind.SINGLE, Kind.UNRESOLVED, Kind.PAIR) else set()
         multiple = round(min(label.multiples, default=0.0), 2)
@@ -81,8 +87,8 @@ def verdicts(record: Path) -> pd.DataFrame:
         right = "right, strong effect" if strong else "right, another"
         what = right if best == known else "half of a pair" if best < known else "wrong"
         what = "" if rule == "no alarm" else what
-        rows.append((" ".join(label.mechanisms), multiple, strong, rule, what))
-    table[["hidden", "multiple", "strong", "rule", "best model"]] = rows
+        rows.append((" ".join(label.mechanisms), multiple, strong, rule, what, chance))
+    table[["hidden", "multiple", "strong", "rule", "best model", "rise"]] = rows
     for name in OTHERS:
         if (path := file_of(answers, name)).is_file():
             right = judged(read_answers(path), truths).set_index("trial")["named_right"]
@@ -98,8 +104,8 @@ def main(
     table = pd.concat(map(verdicts, records or kept), ignore_index=True)
     halted = table[~table["rule"].isin(["", "no alarm"])]
     print(markdown_table(pd.crosstab(halted["rule"], halted["best model"]).reset_index()))
-    sure = table[table["held_out_after"].notna() & (table["rule"] != "a tie")]
-    rise, best = sure["held_out_after"] - sure["held_out_before"], sure["best model"]
+    sure = table[table["rise"].notna() & (table["rule"] != "a tie")]
+    rise, best = sure["rise"], sure["best model"]
     counts = {"names": best.value_counts()} | {f"over {x:g}": best[rise > x].value_counts() for x in LIMITS}
     print(markdown_table(pd.DataFrame(counts).fillna(0).astype(int).rename_axis("Q rises by").reset_index()))
     missed = table[table["strong"] & ((table["rule"] != "") | (table["best model"] == "wrong"))]

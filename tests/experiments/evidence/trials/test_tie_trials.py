@@ -25,10 +25,10 @@ def test_only_the_repeated_condition_has_more_heaps_and_a_model_differs_from_its
 
 def test_hindsight_takes_the_best_answer_of_each_tie() -> None:
     rows = [
-        dict.fromkeys(CHOICES, "a") | {"expected": True, "a": "a tie", "b": "the truth"},
-        dict.fromkeys(CHOICES, "b") | {"expected": True, "a": "a wrong name", "b": "unknown"},
+        dict.fromkeys(CHOICES, "a") | {"chance": 0.5, "a": "a tie", "b": "the truth"},
+        dict.fromkeys(CHOICES, "b") | {"chance": 0.5, "a": "a wrong name", "b": "unknown"},
     ]
-    order = ["expected", *CHOICES, "a", "b"]
+    order = ["chance", *CHOICES, "a", "b"]
     found = compared(pd.DataFrame(rows)[order]).set_index("condition")
     assert found.loc["the search", "a tie"] == found.loc["the search", "unknown"] == "1"
     assert found.loc["best in hindsight", "only the search : only it"].startswith("0 : 1 of 2")

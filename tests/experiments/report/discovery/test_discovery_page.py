@@ -176,11 +176,15 @@ def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(terms
     found = made_discovery(Verdict.TIE)
     assert found.next_experiment is not None
     words = " ".join(changes(found, terms, Settings()))
-    assert "8 more tests under the condition “wide” would settle it" in words
-    weak = replace(found, next_experiment=replace(found.next_experiment, wanted_q=25.9))
+    assert "8 more tests under the condition “wide” are expected to settle it" in words
+    assert "in 84\N{NO-BREAK SPACE}% of such cases" in next_step(found, terms)
+    every = replace(found.next_experiment, conditions=found.data.conditions)
+    words = next_step(replace(found, next_experiment=every), terms)
+    assert words.startswith("Repeat the test 8 times under each condition.")
+    weak = replace(found, next_experiment=replace(every, chance=0.6))
     words = " ".join(changes(weak, terms, Settings()))
-    assert "would settle it (" not in words
-    assert "No condition of the study would settle it, not with 8 more tests either." in words
+    assert "8 more tests under each condition are not expected to settle it." in words
+    assert "would do so in 60\N{NO-BREAK SPACE}% of such cases" in next_step(weak, terms)
     # then what each of the two would do by itself
     for name in found.named:
         assert terms.mechanisms[name].confirm in words
@@ -300,8 +304,8 @@ def test_models_of_two_effects_have_their_titles_in_the_next_experiment(terms: T
         "the model with tilt of the plate and spread of sizes from the model with tilt of the plate" in words
     )
     assert words.startswith("Repeat the test")
-    weak = next_step(replace(found, next_experiment=replace(step, expected_q=0.0)), terms)
-    assert weak.startswith("No condition of the study would tell the model with tilt of the plate and spread")
+    weak = next_step(replace(found, next_experiment=replace(step, chance=0.0)), terms)
+    assert weak.startswith("More heaps are not expected to tell the model with tilt of the plate and spread")
     assert "Repeat the test" not in weak
 
 
