@@ -1,14 +1,12 @@
 """The generator of the trials, apart from the analysis: it draws and seals truths, and simulates their heaps.
 
     python -m experiments.evidence.trials.generate_trials bank out/trials/bank.npz --device cuda
-    python -m experiments.evidence.trials.generate_trials fit out/trials/bank.npz
     python -m experiments.evidence.trials.generate_trials seal out/trials --bank out/trials/bank.npz
     python -m experiments.evidence.trials.generate_trials measure out/trials --part alone --device cuda
 
-The first makes a bank that knows outlines. The second fits one anew, and keeps with it what takes longest
-to find. The third writes what is known beforehand (``declared.json``, ``sealed.csv``) into FOLDER/record, to
-be published before the fourth runs, and the labels into FOLDER/hidden, where no analysis looks. The fourth
-writes the file of measured heaps of every trial into FOLDER/data; interrupted, it goes on where it was.
+The first makes a bank that knows outlines. The second writes what is known beforehand (``declared.json``,
+``sealed.csv``) into FOLDER/record, to be published before the third runs, and the labels into FOLDER/hidden,
+where no analysis looks. The third writes the file of measured heaps of every trial into FOLDER/data.
 """
 
 import secrets
@@ -22,7 +20,7 @@ import numpy as np
 import typer
 
 from dem_warp.version import source_commit
-from doe.discrepancy import Bank, Simulator, fit_emulator, fitted
+from doe.discrepancy import Bank, Simulator, fit_emulator
 from experiments.cases import Resources, open_workers
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.commands.console import clear_errors
@@ -38,6 +36,7 @@ from experiments.evidence.trials.declaration import (
     with_names,
 )
 from experiments.evidence.trials.findings import VIEWS
+from experiments.evidence.trials.other_codes.code_effects import DECLARED, OutsideSimulator
 from experiments.evidence.trials.trial_camera import stated_scales
 from experiments.evidence.trials.trial_heaps import cases_of, write_heaps
 from experiments.evidence.trials.trials_folder import Folder, noted_run
@@ -57,9 +56,6 @@ from experiments.studyfile import Study, load_study
 
 STUDY = Path(__file__).parents[2] / "studies" / "trial" / "study.toml"
 """The study that the trials are about."""
-
-OUTSIDE = {path.stem: path for path in Path(__file__).parent.glob("outside/*.toml")}
-"""Effects that the library never has, written as its mechanisms are."""
 
 STEP_SHARE = 0.8
 """The generator's time step is this part of the study's."""
@@ -155,19 +151,6 @@ def make(
 
 
 @app.command()
-def fit(
-    file: Annotated[Path, typer.Argument(help="File of the bank.")],
-    scale: Annotated[str, typer.Option(help="Scale of the trial study; left out: as written.")] = "",
-) -> None:
-    """Fit a bank of the trial study anew, and keep with it what takes longest to find."""
-    with clear_errors():
-        bank = fitted(replace(Search.of(load_study(STUDY, scale or None)).read_bank(file), kriged=None))
-        with replacing(file) as temporary:
-            bank.save(temporary)
-        print(f"{len(bank.kriged.table()) if bank.kriged else 0} parts kriged: {file}")
-
-
-@app.command()
 def seal(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
     bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
@@ -180,8 +163,7 @@ def seal(
         numbers = Plan(**read_toml(plan)[1]) if plan else Plan()
         place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
         waves = search.read_bank(bank or bank_beside(scale))
-        outside = [Declared(m.name, m.null, m.maximum) for m in library_for(search.study, OUTSIDE)]
-        seal_trials(place, search, waves, numbers, secrets.randbits(63) if seed is None else seed, outside)
+        seal_trials(place, search, waves, numbers, secrets.randbits(63) if seed is None else seed, DECLARED)
         print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
 
 
@@ -199,11 +181,10 @@ def measure(
         sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
         labels = list(revealed(read_labels(place.hidden_labels), sealed).values())
         study = generators_study(declaration.scale)
-        library = (*library_for(study), *library_for(study, OUTSIDE))
         table = OutcomeTable(place.hidden / "outcomes.sqlite")
         with (
             open_workers(Resources(device, workers)) as simulators,
-            EngineSimulator(study, library, table, simulators) as simulator,
+            OutsideSimulator(study, library_for(study), table, simulators) as simulator,
             noted_run(place, f"heaps, {part or 'all'}", device, table),
         ):
             measure_trials(place, labels, declaration, simulator)

@@ -1,28 +1,22 @@
-"""Effects of the trials in other codes: those that the library lacks, and how its own are made there."""
+"""Effects that the library lacks, in our engine and in other codes."""
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-
-import numpy as np
+from typing import Any
 
 from dem_warp import Case, GrainPopulation, LiftedCylinder, SizeClasses
-from dem_warp.population import SIZE_VARIANCE
+from dem_warp.model import GRAVITY
+from doe.discrepancy import Point
+from experiments.discover.engine_simulator import EngineSimulator
 from experiments.evidence.trials.other_codes.odd_lift import odd
 from experiments.evidence.trials.truths import Declared
+from experiments.export.sizes import classes_of
 
 LiftCase = Case[LiftedCylinder]
 
-SLIPPERY = 0.15
-"""Friction of slippery grains over that of the others."""
-
-SOFT_SHARE = 0.5
-"""Part of the grains that the soft class has."""
-
-LOGNORMAL_CUT = 2.0
-"""A lognormal spread of sizes ends at this many deviations of the logarithm: larger grains jam the tube."""
-
-LOGNORMAL_CLASSES = 7
+HALF = 0.5 ** (1.0 / 3.0)
+"""Size of a half of a grain over that of the grain, whose shape it has."""
 
 
 @dataclass(frozen=True)
@@ -41,78 +35,81 @@ class OutsideEffect:
     """Makes of a case, and a size, the case that has it."""
 
 
-def _taper(case: LiftCase, degrees: float) -> LiftCase:
-    return replace(case, scene=odd(case.scene, taper=math.radians(degrees)))
+def _densities(case: LiftCase, ratio: float) -> LiftCase:
+    """Make half of the grains denser; the steps are those of the lighter half."""
+    scene = odd(case.scene, density_ratio=ratio)
+    fraction = math.sqrt(scene.densities[0]) * case.numerics.time_step_fraction
+    return replace(case, scene=scene, numerics=replace(case.numerics, time_step_fraction=fraction))
 
 
-def _turn(case: LiftCase, rate: float) -> LiftCase:
-    return replace(case, scene=odd(case.scene, turn_rate=rate))
+def _bow(case: LiftCase, part: float) -> LiftCase:
+    return replace(case, scene=odd(case.scene, bow=part * case.scene.diameter))
 
 
-def _slippery(case: LiftCase, share: float) -> LiftCase:
-    return replace(case, scene=odd(case.scene, odd_share=share, odd_friction=SLIPPERY))
+def _jump(case: LiftCase, part: float) -> LiftCase:
+    return replace(case, scene=odd(case.scene, jump=part * case.scene.height))
 
 
-def _soft(case: LiftCase, factor: float) -> LiftCase:
-    return replace(case, scene=odd(case.scene, odd_share=SOFT_SHARE, odd_modulus=1.0 / factor))
+def _charge(case: LiftCase, weights: float) -> LiftCase:
+    return replace(case, scene=odd(case.scene, charge=weights * _weight(case)))
 
 
-def _slick(case: LiftCase, part: float) -> LiftCase:
-    """Take friction from the plate, save from one of known friction: that is another plate."""
-    if case.scene.plate_friction is not None:
-        return case
-    friction = (1.0 - part) * case.grain_wall.static_friction
-    return replace(case, scene=replace(case.scene, plate_friction=friction))
+def _wet(case: LiftCase, weights: float) -> LiftCase:
+    return replace(case, scene=odd(case.scene, wetting=weights * _weight(case)))
 
 
-def _lognormal(case: LiftCase, deviation: float) -> LiftCase:
-    """Spread the sizes lognormally at the same mean mass, in classes of one probability each."""
-    shares = (np.arange(LOGNORMAL_CLASSES) + 0.5) / LOGNORMAL_CLASSES
-    # the middles of the classes, of a normal distribution that is cut at both ends
-    below = 0.5 * math.erfc(LOGNORMAL_CUT / math.sqrt(2.0))
-    logs = np.array([_normal_quantile(below + share * (1.0 - 2.0 * below)) for share in shares])
-    sizes = np.exp(deviation * logs / math.sqrt(float(np.mean(logs**2))))
-    grains = case.grains
-    wanted = grains.size_mean**3 + 3.0 * grains.size_mean * SIZE_VARIANCE * grains.size_sd**2
-    sizes *= (wanted / float(np.mean(sizes**3))) ** (1.0 / 3.0)
-    classes = SizeClasses(tuple(sizes.tolist()), (1.0 / LOGNORMAL_CLASSES,) * LOGNORMAL_CLASSES)
-    return replace(case, grains=GrainPopulation.of_classes(grains.shape, grains.material, classes))
+def _broken(case: LiftCase, part: float) -> LiftCase:
+    """Break a part of the grains in two, so that there are more of them."""
+    grains, scene = case.grains, case.scene
+    sizes = [(size, (1.0 - part) / (1.0 + part) * share) for size, share in classes_of(grains)]
+    sizes += [(HALF * size, 2.0 * part / (1.0 + part) * share) for size, share in classes_of(grains)]
+    classes = SizeClasses(*zip(*sorted(sizes), strict=True))
+    count = round((1.0 + part) * scene.supply(case))
+    broken = GrainPopulation.of_classes(grains.shape, grains.material, classes)
+    return replace(case, grains=broken, scene=replace(scene, grain_count=count))
 
 
-def _normal_quantile(share: float) -> float:
-    # a study is read without SciPy
-    from scipy.special import ndtri
-
-    return float(ndtri(share))
+def _weight(case: LiftCase) -> float:
+    """Mean weight of a grain [N]."""
+    return case.grains.mean(lambda shape: shape.volume) * case.grain_material.density * GRAVITY
 
 
 OUTSIDE: Mapping[str, OutsideEffect] = {
-    "conical_tube": OutsideEffect(
-        "The tube narrows upwards; half the angle of its cone, in degrees.", 0.0, 3.0, _taper
+    "bent_tube": OutsideEffect(
+        "The tube is bowed; how far its middle is off, over its diameter.", 0.0, 0.5, _bow
     ),
-    "lognormal_sizes": OutsideEffect(
-        "Sizes are spread lognormally at the same mean mass; deviation of their logarithm.", 0.05, 0.5,
-        _lognormal,
+    "broken_grains": OutsideEffect(
+        "Some grains broke in two before the fill; part of the number of whole ones.", 0.0, 0.98, _broken
     ),
-    "slick_plate": OutsideEffect(
-        "The plate rubs less than the tube, save one of known friction; part of the friction that is gone.",
-        0.0, 0.9, _slick,
+    "jerk": OutsideEffect("The tube starts with a jerk; how far it jumps, over its height.", 0.0, 0.3, _jump),
+    "static_charge": OutsideEffect(
+        "Tube and plate attract the grains; the pull on a sphere over a grain's weight.", 0.0, 2.0, _charge
     ),
-    "slippery_class": OutsideEffect(
-        f"Some grains have {SLIPPERY:g} of the others' friction; part of the number.", 0.0, 0.5, _slippery
+    "two_densities": OutsideEffect(
+        "Half of the grains are denser; their density over that of the others.", 1.0, 20.0, _densities
     ),
-    "soft_class": OutsideEffect(
-        f"{SOFT_SHARE:g} of the grains are softer; modulus of the others over theirs.", 1.0, 200.0, _soft
+    "wet_patches": OutsideEffect(
+        "Half of the plate is wet in patches; their pull on a sphere over a grain's weight.", 0.0, 4.0, _wet
     ),
-    "turning_tube": OutsideEffect(
-        "The tube turns about its axis while it is lifted; radians a second.", 0.0, 60.0, _turn
-    ),
-}  # fmt: skip
-"""Effects that the library lacks, by name.
-
-Half of each range leaves a gap, with every observable, in heaps that LIGGGHTS makes at the middle of the
-factors, eight of 100 grains a condition: trials draw from the upper half.
-"""
+}
+"""Effects that the library lacks, by name: trials draw from the upper half of each range."""
 
 DECLARED = tuple(Declared(name, each.null, each.maximum) for name, each in OUTSIDE.items())
 """The same, as they are declared."""
+
+
+class OutsideSimulator(EngineSimulator):
+    """Answers points that may name mechanisms of the library and effects that it lacks."""
+
+    def made(self, case: Case[Any]) -> Case[Any]:
+        """Return a case as the workshop makes it."""
+        return case
+
+    def case(self, point: Point) -> Case[Any]:
+        """Build the case of a point, with the effects that the library lacks."""
+        known = tuple(size for size in point.sizes if size[0] not in OUTSIDE)
+        case = self.made(super().case(replace(point, sizes=known)))
+        for name, size in point.sizes:
+            if name in OUTSIDE:
+                case = OUTSIDE[name].change(case, size)
+        return case

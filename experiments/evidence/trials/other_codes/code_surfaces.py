@@ -1,7 +1,6 @@
 """Kinds of grains and walls of a case in another code: their materials, contacts and templates."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -57,8 +56,13 @@ class Bench:
 
     @property
     def templates(self) -> tuple[Template, ...]:
-        """Grains of every class of size."""
-        return self.lift.templates
+        """Grains of every class of size and density."""
+        parts = self.scene.densities
+        return tuple(
+            replace(each, density=part * each.density, fraction=each.fraction / len(parts))
+            for part in parts
+            for each in self.lift.templates
+        )
 
     @property
     def look_steps(self) -> int:
@@ -79,7 +83,7 @@ class Bench:
     @property
     def rain_radius(self) -> float:
         """Radius of that space [m]."""
-        return self.scene.upper_radius - self.lift.skin
+        return self.scene.diameter / 2 - self.lift.skin
 
     @property
     def rain_rate(self) -> float:
@@ -124,18 +128,6 @@ class Bench:
         case = replace(self.case, mechanisms=())
         heaviest = max(template.mass for template in self.templates)
         with_grain, with_tube = contacts_of(case, self.lift.largest_radius, heaviest)
-        plate = self.scene.contacts(case)[2]
+        plate = replace(self.scene.contacts(case)[2], mechanisms=())
         surface = replace(with_tube.surface, static_friction=plate.static_friction)
         return with_grain, with_tube, replace(with_tube, surface=surface, coefficients=plate)
-
-    @property
-    def has_odd(self) -> bool:
-        """True where some grains are of another kind."""
-        return self.scene.odd_share > 0.0
-
-    def kinds(self) -> Sequence[tuple[bool, Template, float]]:
-        """Templates of the rain: odd or not, the template, its part of the number."""
-        share = self.scene.odd_share
-        kinds = [(False, template, (1.0 - share) * template.fraction) for template in self.templates]
-        odd_kinds = [(True, template, share * template.fraction) for template in self.templates]
-        return kinds + odd_kinds if self.has_odd else kinds

@@ -23,6 +23,7 @@ import typer
 from experiments.cases import Resources, Workers, open_workers
 from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.commands.console import clear_errors
+from experiments.discover.mechanism_files import LONG_LEVER
 from experiments.discover.search import Search
 from experiments.evidence.trials.declaration import Declaration, read_declaration
 from experiments.evidence.trials.generate_trials import STUDY, bank_beside, seal_trials
@@ -41,10 +42,11 @@ from experiments.io.files import write_text
 from experiments.io.toml_files import read_toml
 from experiments.studyfile import load_study
 
-PLAN = Plan(nulls=40, strong=8, weak=0, unresolved=8, withheld=0, outside=4, pairs=12, replicates=8)
+PLAN = Plan(nulls=60, strong=13, weak=0, unresolved=6, withheld=0, outside=6, pairs=40, replicates=10)
 """Numbers of trials, where no other plan is given; mechanisms are those that the code can make."""
 
-SCALE = "bench"
+SCALE = "relative"
+"""Scale whose laws resist rolling as LIGGGHTS does."""
 
 MISSING = 0.1
 """Largest part of a trial's heaps that may fail; a clogged tube is none of them."""
@@ -137,6 +139,8 @@ def seal(
     with clear_errors():
         numbers = plan_for(Plan(**read_toml(plan)[1]) if plan else PLAN)
         place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
+        if search.study.solver.laws.rolling in LONG_LEVER:
+            raise InputError("--scale", "must resist rolling with the lever R*, as LIGGGHTS does", scale)
         waves = search.read_bank(bank or bank_beside(scale))
         drawn = secrets.randbits(63) if seed is None else seed
         seal_trials(place, search, waves, numbers, drawn, DECLARED)

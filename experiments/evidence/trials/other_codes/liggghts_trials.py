@@ -4,21 +4,21 @@ import math
 
 import numpy as np
 
+from dem_warp import effective_moduli
 from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.scenes.lifted_cylinder import GONE
 from experiments.evidence.trials.other_codes.code_surfaces import BIN, FILL_MARGIN, Bench
 from experiments.evidence.trials.other_codes.dump_reading import DRAG, FRAMES
-from experiments.evidence.trials.other_codes.odd_lift import OddLift
 from experiments.export import liggghts_text as text
 from experiments.export import values
-from experiments.export.lift import prism, stl_text
+from experiments.export.lift import stl_text
 from experiments.export.liggghts_exporter import CONVENTIONS, LIGGGHTS
 from experiments.export.script_text import Rain, clear_loop, plain, rest_loop, watched
 
-INPUT, TUBE, PLATE = "lift.in", "tube.stl", "plate.stl"
+INPUT, TUBE, PLATE, WET = "lift.in", "tube.stl", "plate.stl", "wet.stl"
 
-GRAIN, ODD = 1, 4
-TYPES = ("grains", "tube", "plate", "grains of another kind")
+GRAIN = 1
+TYPES = ("grains", "tube", "plate", "wet patches")
 """Types of LIGGGHTS's atoms."""
 
 _SORTING = "sort 0 0.0"
@@ -31,7 +31,7 @@ _WALLS = """
 # the plate is a mesh, since it may shake
 fix tube all mesh/surface/stress file tube.stl type 2 stress on
 fix plate all mesh/surface file plate.stl type 3
-fix walls all wall/gran model {model} mesh n_meshes 2 meshes tube plate
+{wet}fix walls all wall/gran model {model} mesh n_meshes {meshes}
 fix bodies all multisphere
 
 # filling
@@ -41,12 +41,11 @@ _LIFT = """
 # lifting; the film and the balance run from now on
 variable now equal step
 variable begin equal ${{now}}
-fix lift all move/mesh mesh tube linear 0 0 {speed:.9g}
-{turn}
 {shake}
 dump film all custom {look} {frames} id id_multisphere x y z vx vy vz radius
 dump_modify film sort id format "%d %d %.9g %.9g %.9g %.6g %.6g %.6g %.9g"
 fix balance all ave/time 1 {look} {look} f_tube[3] file {drag}
+{jump}fix lift all move/mesh mesh tube linear 0 0 {speed:.9g}
 variable rise equal 0
 {loop}{still}
 """
@@ -60,6 +59,14 @@ unfix shake
 run {more}
 """
 
+
+_JUMP = """\
+fix lift all move/mesh mesh tube linear 0 0 {speed:.9g}
+run {look}
+unfix lift
+"""
+
+_WET = "fix wet all mesh/surface file wet.stl type 4\n"
 
 _END = """
 run {check}
@@ -81,18 +88,13 @@ def liggghts_files(bench: Bench) -> dict[str, str]:
         rest_loop(bench.lift, "rest", "quit", bench.check_steps),
         end,
     ]
+    wet = scene.patches[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
     return {
-        TUBE: stl_text("tube", _tube(scene)),
+        TUBE: stl_text("tube", scene.tube),
         PLATE: stl_text("plate", plate),
+        WET: stl_text("wet", wet),
         INPUT: "".join(phases),
     }
-
-
-def _tube(scene: OddLift) -> np.ndarray:
-    """Triangles of the tube, (2 sides, 3, 3) [m]."""
-    corners = prism(1.0, scene.height, scene.tube_sides)
-    radii = np.where(corners[..., 2] > 0.0, scene.upper_radius, scene.lower_radius)
-    return corners * np.stack([radii, radii, np.ones_like(radii)], axis=-1)
 
 
 def _setup(bench: Bench) -> str:
@@ -112,10 +114,10 @@ def _setup(bench: Bench) -> str:
         lift.steps(bench.rain_period),
         scene.rain_speed,
     )
-    kinds = [(template, part, ODD if is_odd else GRAIN) for is_odd, template, part in bench.kinds()]
+    kinds = [(template, template.fraction, GRAIN) for template in bench.templates]
     parts = [
         text.head(
-            TYPES if bench.has_odd else TYPES[:-1],
+            TYPES,
             (-half_width, half_width, -half_width, half_width, bottom, top),
             lift.skin,
             BIN * (2.0 * lift.largest_radius + lift.skin),
@@ -123,7 +125,11 @@ def _setup(bench: Bench) -> str:
         ),
         text.contacts(_properties(bench) | numbers, pair_model, lift.case.time_step),
         text.weight(scene.gravity),
-        _WALLS.format(model=text.model_words(words)),
+        _WALLS.format(
+            model=text.model_words(words | {"cohesion": cohesion if scene.charge or scene.wetting else ""}),
+            wet=_WET if scene.wetting else "",
+            meshes="3 meshes tube plate wet" if scene.wetting else "2 meshes tube plate",
+        ),
         text.pouring(kinds, rain, lift.seeds(2 + len(kinds))),
         watched(lift, bench.check_steps),
         f"\nrun {look * math.ceil(fill / look)}\nunfix rain\n",
@@ -132,38 +138,39 @@ def _setup(bench: Bench) -> str:
 
 
 def _properties(bench: Bench) -> dict[str, str]:
-    """Write the global properties of the types: grains, tube, plate, and grains of another kind."""
-    scene = bench.scene
-    among, tube, plate = (values(LIGGGHTS.contact_terms(contact)) for contact in bench.contacts())
+    """Write the global properties of the types: grains, tube, plate, and wet patches."""
+    contacts = [values(LIGGGHTS.contact_terms(contact)) for contact in bench.contacts()]
     material, wall = (
-        values(LIGGGHTS.material_terms(part)) for part in (bench.case.grain_material, scene.wall_material)
+        values(LIGGGHTS.material_terms(part))
+        for part in (bench.case.grain_material, bench.scene.wall_material)
     )
-    materials = [material, wall, wall]
-    if bench.has_odd:
-        materials.append(material | {"youngsModulus": scene.odd_modulus * material["youngsModulus"]})
 
     def contact(i: int, j: int) -> dict[str, float]:
-        own, other = (0 if kind == ODD - 1 else kind for kind in sorted((i, j)))
-        # walls do not touch each other, but LIGGGHTS wants numbers for them
-        terms = (among, tube, plate)[max(own, other) if min(own, other) == 0 or i == j else 1]
-        factor = scene.odd_friction if ODD - 1 in (i, j) else 1.0
-        return terms | {"coefficientFriction": factor * terms["coefficientFriction"]}
+        # patches are of the plate; walls do not touch each other, but LIGGGHTS wants numbers for them
+        return contacts[min(i, j, 2) or min(max(i, j), 2)]
 
-    return text.properties(materials, contact)
+    return text.properties([material, wall, wall, wall], contact)
 
 
 def _cohesion(bench: Bench) -> tuple[str, dict[str, str]]:
-    """LIGGGHTS' words for what holds grains together, and the properties that it needs."""
-    types = 4 if bench.has_odd else 3
-    if work := bench.adhesion():
-        density = energy_density(work, bench.radius, bench.modulus)
-        pairs = "  ".join(plain([density] * types) for _ in range(types))
+    """LIGGGHTS' words for what holds grains together, or to walls, and the properties that it needs."""
+    scene, types, radius = bench.scene, len(TYPES), bench.radius
+    among = 1.5 * math.pi * bench.adhesion() * radius / 2.0  # JKR's largest pull between two spheres
+    wall_modulus = effective_moduli(bench.case.grain_material, scene.wall_material)[0]
+    densities = np.zeros((types, types))
+    densities[0] = [
+        energy_density(among, radius / 2.0, bench.modulus),
+        *(energy_density(pull, radius, wall_modulus) for pull in (scene.charge, scene.charge, scene.wetting)),
+    ]
+    densities[:, 0] = densities[0]
+    if densities.any():
+        pairs = "  ".join(plain(row) for row in densities.tolist())
         return "cohesion sjkr", {"cohesionEnergyDensity": f"peratomtypepair {types} {pairs}"}
     bridge = bench.bridges()
     if bridge is None:
         return "", {}
-    part, tension = wetting(bridge, bench.radius)
-    reach = 1.0 + _SPARE * bridge.reach(bench.radius, bench.modulus) / (2.0 * bench.smallest_radius)
+    part, tension = wetting(bridge, radius)
+    reach = 1.0 + _SPARE * bridge.reach(radius, bench.modulus) / (2.0 * bench.smallest_radius)
     scalars = {
         "surfaceLiquidContentInitial": part,
         "surfaceTension": tension,
@@ -177,15 +184,13 @@ def _cohesion(bench: Bench) -> tuple[str, dict[str, str]]:
     }
 
 
-def energy_density(work: float, radius: float, modulus: float) -> float:
-    """Energy density k [J/m3] of ``sjkr`` with which two spheres are as hard to part as after JKR.
+def energy_density(pull: float, reduced: float, modulus: float) -> float:
+    """Energy density k [J/m3] of ``sjkr`` whose largest pull is `pull` [N], at a reduced radius R* [m].
 
     Its attraction is k 2 pi R* d, against Hertz's 4/3 E* sqrt(R*) d^(3/2); their sum pulls by
-    (2 pi R* k)^3 / (6.75 K^2) at the most, K = 4/3 E* sqrt(R*). JKR's contact holds 3/2 pi W R*.
+    (2 pi R* k)^3 / (6.75 K^2) at the most, K = 4/3 E* sqrt(R*).
     """
-    reduced = radius / 2.0
     stiffness = 4.0 / 3.0 * modulus * math.sqrt(reduced)
-    pull = 1.5 * math.pi * work * reduced
     return math.cbrt(6.75 * stiffness**2 * pull) / (2.0 * math.pi * reduced)
 
 
@@ -205,21 +210,18 @@ def wetting(bridge: CapillaryBridge, radius: float) -> tuple[float, float]:
 def _lift(bench: Bench) -> str:
     scene, lift, look = bench.scene, bench.lift, bench.look_steps
     check_rise = bench.check_steps * lift.case.time_step * scene.lift_speed
-    turning = scene.turn_rate > 0.0
-    period = 2.0 * math.pi / scene.turn_rate if turning else 0.0
-    turn = f"fix turn all move/mesh mesh tube rotate origin 0 0 0 axis 0 0 1 period {period:.9g}"
     amplitude, frequency = scene.vibration_amplitude, scene.vibration_frequency
     shaking = amplitude > 0.0
     wiggle = f"amplitude 0 0 {amplitude:.9g} period {1.0 / frequency:.9g}"
     shake = f"fix shake all move/mesh mesh plate wiggle {wiggle}"
-    # motions that are superposed are taken off in reverse order
-    still = ("unfix turn\n" if turning else "") + "unfix lift\n"
+    still = "unfix lift\n"
+    jump = _JUMP.format(speed=scene.jump / (look * lift.case.time_step), look=look)
     steps = lift.steps(scene.vibration_time)
     if shaking:
         still += _SHAKING.format(steps=steps, more=-steps % look)
     return _LIFT.format(
         speed=scene.lift_speed,
-        turn=turn if turning else "",
+        jump=jump if scene.jump else "",
         shake=shake if shaking else "",
         look=look,
         frames=FRAMES,

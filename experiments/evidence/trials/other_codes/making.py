@@ -14,8 +14,7 @@ MADE: Mapping[str, str] = {
     "plate_tilt": "gravity turned towards +x: the same",
     "rolling_torque": (
         "`cdt` or `epsd2` against the relative rotation with the lever R*: `cdt` acts for whole steps, "
-        "`epsd2` is a spring; where the study has a torque against each grain's own spin, whose lever is "
-        "the distance to the grain's centre, the coefficient gives the same mean torque"
+        "`epsd2` is a spring"
     ),
     "size_spread": "five classes of size with the moments of the normal spread, at the same mean mass",
     "vibration": "the plate, a mesh, wiggles as ours does, from the lift on for the same time",

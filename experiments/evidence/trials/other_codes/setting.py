@@ -7,14 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp import PRESETS, Case, Interaction
+from dem_warp import PRESETS, Case
 from dem_warp.laws.conventions import Rolling
-from experiments.discover.mechanism_files import LONG_LEVER
 from experiments.evidence.trials.other_codes.odd_lift import odd
-from experiments.export.lift import FIRST_SEED
-
-DIRECTIONS = 4096
-"""Directions that a grain is touched from, for the mean of its levers."""
 
 _STREAM = 2
 """Stream of random numbers of a trial's seed; 1 is that of its camera."""
@@ -58,32 +53,9 @@ class Setting:
             look_time=self.look_time,
         )
         fraction = self.step_share * case.numerics.time_step_fraction
-        among, wall = rolling_levers(case)
         return replace(
             case,
             scene=scene,
-            grain_grain=_with_lever(case.grain_grain, among),
-            grain_wall=_with_lever(case.grain_wall, wall),
             numerics=replace(case.numerics, time_step_fraction=fraction),
             laws=replace(PRESETS["liggghts"], rolling=self.rolling),
         )
-
-
-def rolling_levers(case: Case[Any]) -> tuple[float, float]:
-    """Levers of a case's rolling resistance over R*, that of the other codes: among grains, and on walls.
-
-    Some have the distance to the grain's centre, here the mean of it, others R* themselves.
-    """
-    if case.laws.rolling not in LONG_LEVER:
-        return 1.0, 1.0
-    shape = case.grains.mixture.shapes[0]
-    directions = np.random.default_rng(FIRST_SEED).normal(size=(DIRECTIONS, 3))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    touched = np.argmax(directions @ shape.centers.T + shape.radii, axis=1)
-    points = shape.centers[touched] + directions * shape.radii[touched, None]
-    lever = float(np.mean(np.linalg.norm(points, axis=1) / shape.radii[touched]))
-    return 2.0 * lever, lever
-
-
-def _with_lever(pair: Interaction, lever: float) -> Interaction:
-    return replace(pair, rolling_friction=lever * pair.rolling_friction)
