@@ -42,20 +42,9 @@ def _densities(case: LiftCase, ratio: float) -> LiftCase:
     return replace(case, scene=scene, numerics=replace(case.numerics, time_step_fraction=fraction))
 
 
-def _bow(case: LiftCase, part: float) -> LiftCase:
-    return replace(case, scene=odd(case.scene, bow=part * case.scene.diameter))
-
-
-def _jump(case: LiftCase, part: float) -> LiftCase:
-    return replace(case, scene=odd(case.scene, jump=part * case.scene.height))
-
-
-def _charge(case: LiftCase, weights: float) -> LiftCase:
-    return replace(case, scene=odd(case.scene, charge=weights * _weight(case)))
-
-
-def _wet(case: LiftCase, weights: float) -> LiftCase:
-    return replace(case, scene=odd(case.scene, wetting=weights * _weight(case)))
+def _odd(name: str, scale: Callable[[LiftCase], float]) -> Callable[[LiftCase, float], LiftCase]:
+    """Change one number of the scene, in multiples of a scale of the case."""
+    return lambda case, size: replace(case, scene=odd(case.scene, **{name: size * scale(case)}))
 
 
 def _broken(case: LiftCase, part: float) -> LiftCase:
@@ -76,22 +65,28 @@ def _weight(case: LiftCase) -> float:
 
 OUTSIDE: Mapping[str, OutsideEffect] = {
     "bent_tube": OutsideEffect(
-        "The tube is bowed; how far its middle is off, over its diameter.", 0.0, 0.5, _bow
+        "The tube is bowed; how far its middle is off, over its diameter.", 0.0, 0.5,
+        _odd("bow", lambda case: case.scene.diameter),
     ),
     "broken_grains": OutsideEffect(
         "Some grains broke in two before the fill; part of the number of whole ones.", 0.0, 0.98, _broken
     ),
-    "jerk": OutsideEffect("The tube starts with a jerk; how far it jumps, over its height.", 0.0, 0.3, _jump),
+    "jerk": OutsideEffect(
+        "The tube starts with a jerk; how far it jumps, over its height.", 0.0, 0.3,
+        _odd("jump", lambda case: case.scene.height),
+    ),
     "static_charge": OutsideEffect(
-        "Tube and plate attract the grains; the pull on a sphere over a grain's weight.", 0.0, 2.0, _charge
+        "Tube and plate attract the grains; the pull on a sphere over a grain's weight.", 0.0, 2.0,
+        _odd("charge", _weight),
     ),
     "two_densities": OutsideEffect(
         "Half of the grains are denser; their density over that of the others.", 1.0, 20.0, _densities
     ),
     "wet_patches": OutsideEffect(
-        "Half of the plate is wet in patches; their pull on a sphere over a grain's weight.", 0.0, 4.0, _wet
+        "Half of the plate is wet in patches; their pull on a sphere over a grain's weight.", 0.0, 4.0,
+        _odd("wetting", _weight),
     ),
-}
+}  # fmt: skip
 """Effects that the library lacks, by name: trials draw from the upper half of each range."""
 
 DECLARED = tuple(Declared(name, each.null, each.maximum) for name, each in OUTSIDE.items())

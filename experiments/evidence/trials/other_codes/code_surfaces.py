@@ -114,11 +114,6 @@ class Bench:
         return CHECKED * self.look_steps
 
     @property
-    def smallest_radius(self) -> float:
-        """Radius of a sphere [m]."""
-        return min(float(template.radii.min()) for template in self.templates)
-
-    @property
     def modulus(self) -> float:
         """Effective modulus E* of two grains [Pa]."""
         return effective_moduli(self.case.grain_material, self.case.grain_material)[0]

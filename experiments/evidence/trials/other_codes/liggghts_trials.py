@@ -17,7 +17,6 @@ from experiments.export.script_text import Rain, clear_loop, plain, rest_loop, w
 
 INPUT, TUBE, PLATE, WET = "lift.in", "tube.stl", "plate.stl", "wet.stl"
 
-GRAIN = 1
 TYPES = ("grains", "tube", "plate", "wet patches")
 """Types of LIGGGHTS's atoms."""
 
@@ -59,14 +58,11 @@ unfix shake
 run {more}
 """
 
-
 _JUMP = """\
 fix lift all move/mesh mesh tube linear 0 0 {speed:.9g}
 run {look}
 unfix lift
 """
-
-_WET = "fix wet all mesh/surface file wet.stl type 4\n"
 
 _END = """
 run {check}
@@ -114,7 +110,7 @@ def _setup(bench: Bench) -> str:
         lift.steps(bench.rain_period),
         scene.rain_speed,
     )
-    kinds = [(template, template.fraction, GRAIN) for template in bench.templates]
+    kinds = [(template, template.fraction, 1) for template in bench.templates]
     parts = [
         text.head(
             TYPES,
@@ -127,7 +123,7 @@ def _setup(bench: Bench) -> str:
         text.weight(scene.gravity),
         _WALLS.format(
             model=text.model_words(words | {"cohesion": cohesion if scene.charge or scene.wetting else ""}),
-            wet=_WET if scene.wetting else "",
+            wet="fix wet all mesh/surface file wet.stl type 4\n" if scene.wetting else "",
             meshes="3 meshes tube plate wet" if scene.wetting else "2 meshes tube plate",
         ),
         text.pouring(kinds, rain, lift.seeds(2 + len(kinds))),
@@ -170,7 +166,9 @@ def _cohesion(bench: Bench) -> tuple[str, dict[str, str]]:
     if bridge is None:
         return "", {}
     part, tension = wetting(bridge, radius)
-    reach = 1.0 + _SPARE * bridge.reach(radius, bench.modulus) / (2.0 * bench.smallest_radius)
+    reach = 1.0 + _SPARE * bridge.reach(radius, bench.modulus) / (
+        2.0 * min(float(t.radii.min()) for t in bench.templates)
+    )
     scalars = {
         "surfaceLiquidContentInitial": part,
         "surfaceTension": tension,
