@@ -76,14 +76,14 @@ OUTSIDE: Mapping[str, OutsideEffect] = {
         _odd("jump", lambda case: case.scene.height),
     ),
     "static_charge": OutsideEffect(
-        "Tube and plate attract the grains; the pull on a sphere over a grain's weight.", 0.0, 2.0,
+        "Tube and plate attract the grains; the pull on a sphere over a grain's weight.", 0.0, 1.4,
         _odd("charge", _weight),
     ),
     "two_densities": OutsideEffect(
         "Half of the grains are denser; their density over that of the others.", 1.0, 20.0, _densities
     ),
     "wet_patches": OutsideEffect(
-        "Half of the plate is wet in patches; their pull on a sphere over a grain's weight.", 0.0, 4.0,
+        "Half of the plate is wet in patches; their pull on a sphere over a grain's weight.", 0.0, 16.0,
         _odd("wetting", _weight),
     ),
 }  # fmt: skip
