@@ -21,10 +21,7 @@ HALF = 0.5 ** (1.0 / 3.0)
 
 @dataclass(frozen=True)
 class OutsideEffect:
-    """An effect that the library lacks.
-
-    It has a size, and no unit that a study knows: `change` makes it.
-    """
+    """An effect that the library lacks, with a size that is in no study."""
 
     sentence: str
     """Explanation in plain language, its size in words."""
@@ -83,7 +80,7 @@ OUTSIDE: Mapping[str, OutsideEffect] = {
         "Half of the grains are denser; their density over that of the others.", 1.0, 20.0, _densities
     ),
     "wet_patches": OutsideEffect(
-        "Half of the plate is wet in patches; their pull on a sphere over a grain's weight.", 0.0, 16.0,
+        "Half of the plate is wet in patches; their pull on a sphere over a grain's weight.", 0.0, 8.0,
         _odd("wetting", _weight),
     ),
 }  # fmt: skip
@@ -91,6 +88,9 @@ OUTSIDE: Mapping[str, OutsideEffect] = {
 
 DECLARED = tuple(Declared(name, each.null, each.maximum) for name, each in OUTSIDE.items())
 """The same, as they are declared."""
+
+UNSEEN = ("broken_grains", "wet_patches")
+"""Those that LIGGGHTS does not make: neither left a gap in its heaps (a wall's pull adds no friction there)."""
 
 
 class OutsideSimulator(EngineSimulator):

@@ -22,14 +22,12 @@ from experiments.evidence.trials.other_codes.dump_reading import (
     read_balance,
     read_film,
 )
-from experiments.evidence.trials.other_codes.liggghts_trials import liggghts_files
+from experiments.evidence.trials.other_codes.liggghts_trials import INPUT, liggghts_files
 from experiments.io.errors import InputError
 from experiments.studyfile.observables import OBSERVABLES, PHOTOGRAPHED
 
 REPORTED = tuple(each.name for each in OBSERVABLES if each.name not in PHOTOGRAPHED)
 """Observables that a film and a balance report."""
-
-INPUT = "lift.in"
 
 
 class Liggghts:

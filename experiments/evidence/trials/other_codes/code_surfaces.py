@@ -40,7 +40,7 @@ class Bench:
             shapes = len(self.case.grains.mixture.shapes)
             raise InputError("the case", "grains of the trials in other codes must have one shape", shapes)
         strange = [each.name for each in self.case.mechanisms if not isinstance(each, JKR | CapillaryBridge)]
-        if strange:
+        if strange or self.scene.wetting:
             raise InputError("the case", "another code makes adhesion and bridges only among grains", strange)
 
     @cached_property
@@ -81,17 +81,12 @@ class Bench:
         return (math.sqrt(speed**2 + fall) - speed) / GRAVITY
 
     @property
-    def rain_radius(self) -> float:
-        """Radius of that space [m]."""
-        return self.scene.diameter / 2 - self.lift.skin
-
-    @property
     def rain_rate(self) -> float:
         """Grains a second: the scene's, or the most that find a place."""
         volume = float(
             np.dot([t.fraction for t in self.templates], [t.mass / t.density for t in self.templates])
         )
-        room = math.pi * self.rain_radius**2 * self.lift.rain_height
+        room = math.pi * self.lift.rain_radius**2 * self.lift.rain_height
         return min(self.scene.rain_rate, DENSEST_RAIN * room / (volume * self.rain_period))
 
     def adhesion(self) -> float:

@@ -27,7 +27,7 @@ from experiments.discover.mechanism_files import LONG_LEVER
 from experiments.discover.search import Search
 from experiments.evidence.trials.declaration import Declaration, read_declaration
 from experiments.evidence.trials.generate_trials import STUDY, bank_beside, seal_trials
-from experiments.evidence.trials.other_codes.code_effects import DECLARED, OUTSIDE
+from experiments.evidence.trials.other_codes.code_effects import DECLARED, OUTSIDE, UNSEEN
 from experiments.evidence.trials.other_codes.code_process import Liggghts
 from experiments.evidence.trials.other_codes.code_simulator import OtherCodeSimulator, workshop_study
 from experiments.evidence.trials.other_codes.making import LAWS, MADE
@@ -42,7 +42,7 @@ from experiments.io.files import write_text
 from experiments.io.toml_files import read_toml
 from experiments.studyfile import load_study
 
-PLAN = Plan(nulls=60, strong=13, weak=0, unresolved=6, withheld=0, outside=6, pairs=40, replicates=10)
+PLAN = Plan(nulls=60, strong=13, weak=0, unresolved=6, withheld=0, outside=9, pairs=40, replicates=10)
 """Numbers of trials, where no other plan is given; mechanisms are those that the code can make."""
 
 SCALE = "relative"
@@ -68,7 +68,7 @@ def write_reality(path: Path) -> None:
         "name": Liggghts.name,
         "laws": LAWS,
         "library": dict(MADE),
-        "outside": {name: each.sentence for name, each in OUTSIDE.items()},
+        "outside": {name: each.sentence for name, each in OUTSIDE.items() if name not in UNSEEN},
     }
     write_text(path, json.dumps(reality, indent=1) + "\n")
 
@@ -143,7 +143,9 @@ def seal(
             raise InputError("--scale", "must resist rolling with the lever R*, as LIGGGHTS does", scale)
         waves = search.read_bank(bank or bank_beside(scale))
         drawn = secrets.randbits(63) if seed is None else seed
-        seal_trials(place, search, waves, numbers, drawn, DECLARED)
+        seal_trials(
+            place, search, waves, numbers, drawn, [each for each in DECLARED if each.name not in UNSEEN]
+        )
         write_reality(place.record / REALITY)
         print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
 

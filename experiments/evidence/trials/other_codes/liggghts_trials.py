@@ -15,9 +15,9 @@ from experiments.export.lift import stl_text
 from experiments.export.liggghts_exporter import CONVENTIONS, LIGGGHTS
 from experiments.export.script_text import Rain, clear_loop, plain, rest_loop, watched
 
-INPUT, TUBE, PLATE, WET = "lift.in", "tube.stl", "plate.stl", "wet.stl"
+INPUT, TUBE, PLATE = "lift.in", "tube.stl", "plate.stl"
 
-TYPES = ("grains", "tube", "plate", "wet patches")
+TYPES = ("grains", "tube", "plate")
 """Types of LIGGGHTS's atoms."""
 
 _SORTING = "sort 0 0.0"
@@ -30,7 +30,7 @@ _WALLS = """
 # the plate is a mesh, since it may shake
 fix tube all mesh/surface/stress file tube.stl type 2 stress on
 fix plate all mesh/surface file plate.stl type 3
-{wet}fix walls all wall/gran model {model} mesh n_meshes {meshes}
+fix walls all wall/gran model {model} mesh n_meshes 2 meshes tube plate
 fix bodies all multisphere
 
 # filling
@@ -64,17 +64,13 @@ run {look}
 unfix lift
 """
 
-_END = """
-run {check}
-"""
-
 _PLATE_REST = 0.98
 """Half the plate's side over that of the box: a mesh must not reach its wall."""
 
 
 def liggghts_files(bench: Bench) -> dict[str, str]:
     """Files of the input of a case, by name."""
-    scene, end = bench.scene, _END.format(check=bench.check_steps)
+    scene = bench.scene
     side = _PLATE_REST * scene.room(bench.lift.reach)[0]
     plate = side * np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]]])
     phases = [
@@ -82,13 +78,11 @@ def liggghts_files(bench: Bench) -> dict[str, str]:
         rest_loop(bench.lift, "settle", "quit", bench.check_steps),
         _lift(bench),
         rest_loop(bench.lift, "rest", "quit", bench.check_steps),
-        end,
+        f"\nrun {bench.check_steps}\n",
     ]
-    wet = scene.patches[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
     return {
         TUBE: stl_text("tube", scene.tube),
         PLATE: stl_text("plate", plate),
-        WET: stl_text("wet", wet),
         INPUT: "".join(phases),
     }
 
@@ -102,7 +96,7 @@ def _setup(bench: Bench) -> str:
     pair_model = text.model_words(words | {"cohesion": cohesion})
     fill = lift.steps(lift.count / bench.rain_rate + FILL_MARGIN)
     rain = Rain(
-        bench.rain_radius,
+        lift.rain_radius,
         lift.rain_bottom - lift.reach,
         bench.rain_top,
         lift.count,
@@ -121,11 +115,7 @@ def _setup(bench: Bench) -> str:
         ),
         text.contacts(_properties(bench) | numbers, pair_model, lift.case.time_step),
         text.weight(scene.gravity),
-        _WALLS.format(
-            model=text.model_words(words | {"cohesion": cohesion if scene.charge or scene.wetting else ""}),
-            wet="fix wet all mesh/surface file wet.stl type 4\n" if scene.wetting else "",
-            meshes="3 meshes tube plate wet" if scene.wetting else "2 meshes tube plate",
-        ),
+        _WALLS.format(model=text.model_words(words | {"cohesion": cohesion if scene.charge else ""})),
         text.pouring(kinds, rain, lift.seeds(2 + len(kinds))),
         watched(lift, bench.check_steps),
         f"\nrun {look * math.ceil(fill / look)}\nunfix rain\n",
@@ -134,7 +124,7 @@ def _setup(bench: Bench) -> str:
 
 
 def _properties(bench: Bench) -> dict[str, str]:
-    """Write the global properties of the types: grains, tube, plate, and wet patches."""
+    """Write the global properties of the types: grains, tube, plate."""
     contacts = [values(LIGGGHTS.contact_terms(contact)) for contact in bench.contacts()]
     material, wall = (
         values(LIGGGHTS.material_terms(part))
@@ -142,10 +132,10 @@ def _properties(bench: Bench) -> dict[str, str]:
     )
 
     def contact(i: int, j: int) -> dict[str, float]:
-        # patches are of the plate; walls do not touch each other, but LIGGGHTS wants numbers for them
-        return contacts[min(i, j, 2) or min(max(i, j), 2)]
+        # walls do not touch each other, but LIGGGHTS wants numbers for them
+        return contacts[min(i, j) or max(i, j)]
 
-    return text.properties([material, wall, wall, wall], contact)
+    return text.properties([material, wall, wall], contact)
 
 
 def _cohesion(bench: Bench) -> tuple[str, dict[str, str]]:
@@ -154,10 +144,8 @@ def _cohesion(bench: Bench) -> tuple[str, dict[str, str]]:
     among = 1.5 * math.pi * bench.adhesion() * radius / 2.0  # JKR's largest pull between two spheres
     wall_modulus = effective_moduli(bench.case.grain_material, scene.wall_material)[0]
     densities = np.zeros((types, types))
-    densities[0] = [
-        energy_density(among, radius / 2.0, bench.modulus),
-        *(energy_density(pull, radius, wall_modulus) for pull in (scene.charge, scene.charge, scene.wetting)),
-    ]
+    densities[0, 0] = energy_density(among, radius / 2.0, bench.modulus)
+    densities[0, 1:] = energy_density(scene.charge, radius, wall_modulus)
     densities[:, 0] = densities[0]
     if densities.any():
         pairs = "  ".join(plain(row) for row in densities.tolist())
