@@ -90,7 +90,7 @@ DECLARED = tuple(Declared(name, each.null, each.maximum) for name, each in OUTSI
 """The same, as they are declared."""
 
 UNSEEN = ("broken_grains", "wet_patches")
-"""Those that LIGGGHTS does not make: neither left a gap in its heaps (a wall's pull adds no friction there)."""
+"""Those that LIGGGHTS does not make: neither left a gap in its heaps (its walls' pull adds no friction)."""
 
 
 class OutsideSimulator(EngineSimulator):
