@@ -46,6 +46,10 @@ STAGE = "surface"
 FIXED = "The study fixes the {} of the composite design."
 """Rule of a centre or half-ranges that the study fixes."""
 
+LEAST_FREEDOM = 3
+"""Degrees of freedom from which on an error says something: with 1 and 2 the 95 % limits of Student's t are
+12.7 and 4.3 standard errors."""
+
 ROUNDING = 1e-12
 """A shrunk design keeps this share of its half-range away from a limit, so that rounding cannot cross it."""
 
@@ -219,6 +223,8 @@ def _fit_decision(
         fit = f"Lack of fit is significant ({p_text(p_lack)}): a quadratic is too simple; shrink the design."
     else:
         fit = f"No lack of fit is found ({p_text(p_lack)})."
+    if (left := round(full.anova["df"]["residual"])) < LEAST_FREEDOM:
+        fit += f" Degrees of freedom for its errors: {left}; it hardly rules anything out."
     numbers = {"p of the model": p_model, "p of lack of fit": p_lack}
     numbers |= {"R2": full.r2, "adjusted R2": full.r2_adjusted}
     numbers |= {f"p of {term}": full.anova["p"][term] for term in full.coded_coefficients.index[1:]}

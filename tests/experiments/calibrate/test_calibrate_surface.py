@@ -33,13 +33,18 @@ def plane_study(**decisions: Mapping) -> StandInStudy:
     return StandInStudy(MEASURED, factors, settings(**decisions), least=-math.inf)
 
 
-def explored(slope: float, step: float = 0.1, **decisions: Mapping) -> SurfaceResult:
+def explored(
+    slope: float, step: float = 0.1, failed: tuple[int, ...] = (), **decisions: Mapping
+) -> SurfaceResult:
     """Explore a plane: 20 deg at the centre, ``slope`` deg for a coded unit of either factor."""
 
     def heaps(table: pd.DataFrame) -> pd.DataFrame:
         noise = [np.random.default_rng(seed).normal(0.0, NOISE) for seed in table["seed"]]
         angle = 20.0 + slope * (table["E"] + table["F"] - 2.0) / HALF_RANGE + noise
-        return table.assign(status="finished", reason="", angle=angle)
+        lost = table["run"].isin(failed)
+        return table.assign(
+            status=np.where(lost, "failed", "finished"), reason="", angle=angle.mask(lost, math.nan)
+        )
 
     study = plane_study(**decisions)
     return explore_surface(study, climbed_box(study, crossed_climb(step)), heaps)
@@ -63,6 +68,13 @@ def at_coded(e: float, f: float) -> dict[str, float]:
 @pytest.mark.parametrize(("step", "half_range"), [(0.1, 0.4), (-0.7, 0.7)])
 def test_a_half_range_is_a_climb_step_but_not_too_short(step: float, half_range: float) -> None:
     assert explored(3.0, step).half_range == pytest.approx({"E": half_range, "F": half_range})
+
+
+def test_a_surface_of_few_runs_says_that_it_rules_hardly_anything_out() -> None:
+    # 13 runs, 6 coefficients: with 3 degrees of freedom t's limit is 3.2 standard errors, with 1 it is 12.7
+    assert "hardly rules" not in explored(3.0, failed=(10, 11, 12, 13)).decisions[-1].outcome
+    few = explored(3.0, failed=(7, 8, 10, 11, 12, 13))
+    assert "Degrees of freedom for its errors: 1" in few.decisions[-1].outcome
 
 
 # The line E + F = s in coded units lies s / sqrt(2) from the centre, nearest at (s / 2, s / 2). The axial
