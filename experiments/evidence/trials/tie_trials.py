@@ -1,7 +1,7 @@
 """The next experiment, in emulated ties: how often the proposed condition settles one, next to other choices.
 
     python -m experiments.evidence.trials.tie_trials
-    python -m experiments.evidence.trials.tie_trials --count 10 --table out/ties.csv
+    python -m experiments.evidence.trials.tie_trials --fresh-runs 4 --count 50 --table out/ties-more.csv
 
 The world is that of `slip_trials`; the search has a bank that is drawn from it, and fresh runs. Where it ends
 in a tie, each condition is repeated in turn, or every condition, in as many heaps in all as the search
@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 import typer
 
-from doe.discrepancy import Discovery, Emulator, Measured, Verdict, analyse, drive, fit_emulator
+from doe.discrepancy import Discovery, Emulator, Measured, Settings, Verdict, analyse, drive, fit_emulator
 from doe.discrepancy.fitting.model_fit import Fitted
 from doe.discrepancy.verdict.next_experiment import TIMES
 from experiments.evidence.record_page import markdown_table
@@ -61,12 +61,14 @@ def heaps_of(number: int) -> tuple[Measured, str, float]:
     return emulated_heaps(truth, theta, {hidden: size}, most, number, settings.systematic), hidden, size
 
 
-def searched(heaps: Measured, number: int, repeated: str = "", more: int = 0) -> tuple[Problem, Discovery]:
+def searched(
+    heaps: Measured, number: int, settings: Settings, repeated: str = "", more: int = 0
+) -> tuple[Problem, Discovery]:
     """Search the first heaps of every condition, and more of one, or as many more of all together."""
     share = math.ceil(more / len(heaps.conditions)) * (repeated == EVERY)
     counts = {name: REPLICATES + (more if name == repeated else share) for name in heaps.conditions}
     values = {name: rows[: counts[name]] for name, rows in heaps.values.items()}  # noqa: PD011
-    seen, settings = replace(heaps, values=values, reasons={}), true_world()[1]
+    seen = replace(heaps, values=values, reasons={})
     problem = Problem(str(number), bank_of(number % BANKS), seen, settings, number)
     return problem, drive(analyse(seen, problem.emulator, settings, number), fresh_runs)
 
@@ -89,11 +91,18 @@ def outcome(found: Discovery, hidden: str) -> str:
     return {Verdict.TIE: "a tie", Verdict.UNKNOWN: "unknown"}.get(found.verdict, "nothing")
 
 
-def ties(start: int) -> Iterator[dict[str, object]]:
+def settings_of(fresh_runs: int) -> Settings:
+    """Return the rules of the study, with a multiple of its fresh runs around the optima."""
+    rules = true_world()[1]
+    points = fresh_runs * rules.refinement_points
+    return replace(rules, refinement_points=points, finish_points=2 * points * (fresh_runs > 1))
+
+
+def ties(start: int, settings: Settings) -> Iterator[dict[str, object]]:
     """Yield ties from a twin on: the choices of a condition, and the answer after each is repeated."""
     for number in count(start):
         heaps, hidden, size = heaps_of(number)
-        problem, found = searched(heaps, number)
+        problem, found = searched(heaps, number, settings)
         step = found.next_experiment
         if found.verdict is not Verdict.TIE or step is None:
             continue
@@ -102,7 +111,7 @@ def ties(start: int) -> Iterator[dict[str, object]]:
         heaps_more = step.replicates * len(step.conditions)
         drawn = str(np.random.default_rng([number, 5]).choice(heaps.conditions))
         farthest = max(heaps.conditions, key=lambda name: contrast(models, name))
-        again = {c: searched(heaps, number, c, heaps_more)[1] for c in (*heaps.conditions, EVERY)}
+        again = {c: searched(heaps, number, settings, c, heaps_more)[1] for c in (*heaps.conditions, EVERY)}
         row = {"twin": number, "hidden": hidden, "size": f"{size:.4g}", "tied": " ".join(found.named)}
         row |= {"heaps": heaps_more, "chance": f"{step.chance:.3f}"}
         row |= dict(zip(CHOICES, (proposed, farthest, drawn), strict=True))
@@ -138,10 +147,12 @@ def compared(table: pd.DataFrame) -> pd.DataFrame:
 def main(
     number: Annotated[int, typer.Option("--count", help="Ties.", min=1)] = 100,
     table: Annotated[Path, typer.Option(help="Table of the record; it may be begun.")] = TABLE,
+    runs: Annotated[int, typer.Option("--fresh-runs", help="Multiple of the study's fresh runs.", min=1)] = 1,
 ) -> None:
     """Draw ties, settle them, and print what each choice of a condition gives."""
     rows = pd.read_csv(table).to_dict("records") if table.is_file() else []
-    for row in islice(ties(int(rows[-1]["twin"]) + 1 if rows else 0), number - len(rows)):
+    start = int(rows[-1]["twin"]) + 1 if rows else 0
+    for row in islice(ties(start, settings_of(runs)), number - len(rows)):
         rows.append({str(name): value for name, value in row.items()})
         pd.DataFrame(rows).to_csv(table, index=False, lineterminator="\n")
     print(markdown_table(compared(pd.read_csv(table))))

@@ -107,7 +107,7 @@ def _missed(found: Discovery, terms: Terms) -> dict[str, Any]:
     return {
         "misses": misses(found, terms)[1:] if unknown else [],  # the sentence tells the first
         "conventions": conventions(found, terms) if unknown else [],
-        "step_first": unknown or slip_decides(found),
+        "step_first": unknown or found.verdict is Verdict.TIE or slip_decides(found),
     }
 
 

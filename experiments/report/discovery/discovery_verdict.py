@@ -29,7 +29,7 @@ from experiments.report.discovery.disagreement import (
     standing_out,
     with_and_without,
 )
-from experiments.report.discovery.terms import Terms, percent, spaced
+from experiments.report.discovery.terms import GAP, Terms, percent, spaced
 from experiments.report.kit.numbers import capital, enumeration, fixed, p_clause, trimmed
 from experiments.report.kit.sentences import say
 
@@ -44,6 +44,9 @@ ALL = 0.995
 
 BOTH = " + "
 """Sign between the two effects of one model in the next experiment."""
+
+SURE = 0.99
+"""Largest chance that is stated."""
 
 SHOWN_RIVALS = 2
 """Refused mechanisms that are reported with their objection."""
@@ -123,10 +126,11 @@ def next_step(found: Discovery, terms: Terms) -> str:
         for name in step.separates
     )
     shared = {"pair": pair, "tests": step.replicates, "setting": _setting(step.conditions)}
-    shared |= {"share": percent(step.chance), "q": trimmed(step.expected_q, 3)}
+    shared |= {"share": percent(min(step.chance, SURE))}
     if not step.settles:
         return say("verdict.cannot_settle", **shared)
-    return say("verdict.repeat", **shared, observable=spaced(step.observable))
+    how = "surer" if found.verdict is Verdict.NAMED else "repeat"
+    return say(f"verdict.{how}", **shared, observable=spaced(step.observable))
 
 
 def _setting(conditions: tuple[str, ...]) -> str:
@@ -238,13 +242,14 @@ def _margins(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str
 
 def _room(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     if found.chosen is not None:
-        share, least = percent(found.chosen.p_value), percent(settings.fit_level)
+        share, least = percent(found.chosen.p_value), f"{100.0 * settings.fit_level:g}{GAP}%"
         yield say("verdict.room", share=share, least=least)
 
 
 def _rivals(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
-    closest = found.candidates[:1] if found.verdict is Verdict.UNKNOWN else ()
-    refused = [c for c in found.candidates if not c.admitted and c.objection and c not in closest]
+    told = tied(found) if found.verdict is Verdict.TIE else found.candidates[:1]
+    told = [] if found.verdict is Verdict.NAMED else told
+    refused = [c for c in found.candidates if not c.admitted and c.objection and c not in told]
     for rival in refused[:SHOWN_RIVALS]:
         objection = _one_name(rival.objection, terms).rstrip(".")
         were = "were" if len(rival.mechanisms) > 1 else "was"

@@ -172,7 +172,9 @@ def test_a_search_has_a_paragraph_and_a_table_to_paste(whole_study: Study, terms
     assert search_pastes(made_discovery(Verdict.NOT_IDENTIFIABLE), whole_study, terms, {}) == []
 
 
-def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(terms: Terms) -> None:
+def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(
+    whole_study: Study, terms: Terms
+) -> None:
     found = made_discovery(Verdict.TIE)
     assert found.next_experiment is not None
     words = " ".join(changes(found, terms, Settings()))
@@ -184,7 +186,16 @@ def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(terms
     weak = replace(found, next_experiment=replace(every, chance=0.6))
     words = " ".join(changes(weak, terms, Settings()))
     assert "8 more tests under each condition are not expected to settle it." in words
-    assert "would do so in 60\N{NO-BREAK SPACE}% of such cases" in next_step(weak, terms)
+    assert "refinement_points" in next_step(weak, terms)
+    assert "they would in 60\N{NO-BREAK SPACE}% of such cases" in next_step(weak, terms)
+    # the tie heads the page with it, and none of its names was refused
+    page = Page(render_discovery(weak, whole_study, terms, Settings())).text
+    assert page.count("More heaps are not expected to tell") == 2
+    assert not any(
+        terms.title(n) in one and "refused" in one
+        for n in found.named
+        for one in changes(weak, terms, Settings())
+    )
     # then what each of the two would do by itself
     for name in found.named:
         assert terms.mechanisms[name].confirm in words
@@ -303,7 +314,7 @@ def test_models_of_two_effects_have_their_titles_in_the_next_experiment(terms: T
     assert (
         "the model with tilt of the plate and spread of sizes from the model with tilt of the plate" in words
     )
-    assert words.startswith("Repeat the test")
+    assert words.startswith("To be surer, repeat the test")
     weak = next_step(replace(found, next_experiment=replace(step, chance=0.0)), terms)
     assert weak.startswith("More heaps are not expected to tell the model with tilt of the plate and spread")
     assert "Repeat the test" not in weak
