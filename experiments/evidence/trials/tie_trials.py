@@ -42,6 +42,7 @@ OUTCOMES = ("the truth", "a tie", "unknown", "nothing", "a wrong name")
 """Answers after the repetition, the best first."""
 SEARCH, RANDOM, EVERY = "the search", "random", "every condition"
 CHOICES = (SEARCH, "2604.01231", RANDOM)
+Searched = tuple[Problem, Discovery]
 FORECASTS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.01)
 
 
@@ -61,16 +62,14 @@ def heaps_of(number: int) -> tuple[Measured, str, float]:
     return emulated_heaps(truth, theta, {hidden: size}, most, number, settings.systematic), hidden, size
 
 
-def searched(
-    heaps: Measured, number: int, settings: Settings, repeated: str = "", more: int = 0
-) -> tuple[Problem, Discovery]:
+def searched(heaps: Measured, number: int, rules: Settings, repeated: str = "", more: int = 0) -> Searched:
     """Search the first heaps of every condition, and more of one, or as many more of all together."""
     share = math.ceil(more / len(heaps.conditions)) * (repeated == EVERY)
     counts = {name: REPLICATES + (more if name == repeated else share) for name in heaps.conditions}
     values = {name: rows[: counts[name]] for name, rows in heaps.values.items()}  # noqa: PD011
     seen = replace(heaps, values=values, reasons={})
-    problem = Problem(str(number), bank_of(number % BANKS), seen, settings, number)
-    return problem, drive(analyse(seen, problem.emulator, settings, number), fresh_runs)
+    problem = Problem(str(number), bank_of(number % BANKS), seen, rules, number)
+    return problem, drive(analyse(seen, problem.emulator, rules, number), fresh_runs)
 
 
 def contrast(models: Sequence[Fitted], condition: str) -> float:
@@ -91,18 +90,11 @@ def outcome(found: Discovery, hidden: str) -> str:
     return {Verdict.TIE: "a tie", Verdict.UNKNOWN: "unknown"}.get(found.verdict, "nothing")
 
 
-def settings_of(fresh_runs: int) -> Settings:
-    """Return the rules of the study, with a multiple of its fresh runs around the optima."""
-    rules = true_world()[1]
-    points = fresh_runs * rules.refinement_points
-    return replace(rules, refinement_points=points, finish_points=2 * points * (fresh_runs > 1))
-
-
-def ties(start: int, settings: Settings) -> Iterator[dict[str, object]]:
+def ties(start: int, rules: Settings) -> Iterator[dict[str, object]]:
     """Yield ties from a twin on: the choices of a condition, and the answer after each is repeated."""
     for number in count(start):
         heaps, hidden, size = heaps_of(number)
-        problem, found = searched(heaps, number, settings)
+        problem, found = searched(heaps, number, rules)
         step = found.next_experiment
         if found.verdict is not Verdict.TIE or step is None:
             continue
@@ -111,7 +103,7 @@ def ties(start: int, settings: Settings) -> Iterator[dict[str, object]]:
         heaps_more = step.replicates * len(step.conditions)
         drawn = str(np.random.default_rng([number, 5]).choice(heaps.conditions))
         farthest = max(heaps.conditions, key=lambda name: contrast(models, name))
-        again = {c: searched(heaps, number, settings, c, heaps_more)[1] for c in (*heaps.conditions, EVERY)}
+        again = {c: searched(heaps, number, rules, c, heaps_more)[1] for c in (*heaps.conditions, EVERY)}
         row = {"twin": number, "hidden": hidden, "size": f"{size:.4g}", "tied": " ".join(found.named)}
         row |= {"heaps": heaps_more, "chance": f"{step.chance:.3f}"}
         row |= dict(zip(CHOICES, (proposed, farthest, drawn), strict=True))
@@ -127,10 +119,8 @@ def compared(table: pd.DataFrame) -> pd.DataFrame:
     own, rows = ends[SEARCH] == OUTCOMES[0], []
     for name, end in ends.items():
         right = end == OUTCOMES[0]
-        gap, share = (
-            100.0 * (own.astype(float) - right),
-            f"{100 * right.mean():.0f} ({100 * right.sem():.1f})",
-        )
+        gap = 100.0 * (own.astype(float) - right)
+        share = f"{100 * right.mean():.0f} ({100 * right.sem():.1f})"
         rows.append({"condition": name, "the truth alone, % (se)": share})
         rows[-1] |= {one: str((end == one).sum()) for one in OUTCOMES[1:]}
         rows[-1]["the search more, % (se)"] = f"{gap.mean():+.0f} ({gap.sem():.1f})"
@@ -151,8 +141,10 @@ def main(
 ) -> None:
     """Draw ties, settle them, and print what each choice of a condition gives."""
     rows = pd.read_csv(table).to_dict("records") if table.is_file() else []
-    start = int(rows[-1]["twin"]) + 1 if rows else 0
-    for row in islice(ties(start, settings_of(runs)), number - len(rows)):
+    start, rules = int(rows[-1]["twin"]) + 1 if rows else 0, true_world()[1]
+    points = runs * rules.refinement_points
+    rules = replace(rules, refinement_points=points, finish_points=2 * points * (runs > 1))
+    for row in islice(ties(start, rules), number - len(rows)):
         rows.append({str(name): value for name, value in row.items()})
         pd.DataFrame(rows).to_csv(table, index=False, lineterminator="\n")
     print(markdown_table(compared(pd.read_csv(table))))

@@ -4,20 +4,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.evidence.trials.baselines.emulated_world import REPLICATES
+from experiments.evidence.trials.baselines.emulated_world import REPLICATES, true_world
 from experiments.evidence.trials.tie_trials import (
     CHOICES,
     compared,
     contrast,
     heaps_of,
     searched,
-    settings_of,
 )
 
 
 def test_only_the_repeated_condition_has_more_heaps_and_a_model_differs_from_itself_nowhere() -> None:
     heaps, hidden, _ = heaps_of(0)
-    problem, _ = searched(heaps, 0, settings_of(1), heaps.conditions[1], 8)
+    problem, _ = searched(heaps, 0, true_world()[1], heaps.conditions[1], 8)
     seen, drawn = problem.measured.values, heaps.values  # noqa: PD011
     counts = [len(seen[name]) for name in heaps.conditions]
     assert counts == [REPLICATES, 2 * REPLICATES, *[REPLICATES] * (len(counts) - 2)]
