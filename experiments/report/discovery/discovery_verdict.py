@@ -247,9 +247,9 @@ def _room(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
 
 
 def _rivals(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
-    told = tied(found) if found.verdict is Verdict.TIE else found.candidates[:1]
-    told = [] if found.verdict is Verdict.NAMED else told
-    refused = [c for c in found.candidates if not c.admitted and c.objection and c not in told]
+    shown = tied(found) if found.verdict is Verdict.TIE else found.candidates[:1]
+    shown = [] if found.verdict is Verdict.NAMED else shown
+    refused = [c for c in found.candidates if not c.admitted and c.objection and c not in shown]
     for rival in refused[:SHOWN_RIVALS]:
         objection = _one_name(rival.objection, terms).rstrip(".")
         were = "were" if len(rival.mechanisms) > 1 else "was"
