@@ -1,7 +1,7 @@
 """Problems of the verification: each is one file of `problems` and one line here."""
 
 from experiments.evidence.verification.check import Problem
-from experiments.evidence.verification.problems.beverloo import beverloo
+from experiments.evidence.verification.problems.beverloo import beverloo, coned
 from experiments.evidence.verification.problems.deme_contacts import deme_contacts
 from experiments.evidence.verification.problems.energy import energy
 from experiments.evidence.verification.problems.heap_angle import heap_angle
@@ -37,6 +37,7 @@ PROBLEMS: dict[str, Problem] = {
     "energy": energy,
     "janssen": janssen,
     "beverloo": beverloo,
+    "coned": coned,
     "heap-angle": heap_angle,
     "released": released,
     "pressed": pressed,
@@ -49,5 +50,6 @@ PROBLEMS: dict[str, Problem] = {
 PEERS = ("liggghts-contacts", "liggghts-clumps", "lammps-contacts", "yade-contacts", "deme-contacts")
 """Problems that run another code, which must be installed."""
 
-HEAVY = ("beverloo", "heap-angle", "penetrated", "pressed", "released", "sheared", "stability", *PEERS)
+BENCH = ("released", "pressed", "penetrated", "sheared")
+HEAVY = ("beverloo", "coned", "heap-angle", "stability", *BENCH, *PEERS)
 """Problems that run only when they are named: minutes on a GPU, up to hours on two cores, or another code."""
