@@ -1,7 +1,7 @@
 """A piston and a sheared lid against closed forms: spheres, a cubic array, a die, a slab, work."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -198,9 +198,22 @@ def sheared(device: str) -> Result:
     angle, loads = ended[1].observables.get("steady_angle", math.nan), STRESS * np.array(LOADS)
     rows = (
         relative_row((LID, "spheres", "normal stress at four loads [Pa]", "load"), loads, normal, 0.01),
+        _circle_row(ended[0].observables),
         absolute_row((LID, "spheres without friction", "angle of flow", "literature"), 5.76, angle, 1.5),
     )
     return Result("Shear", SHEARED, (*rows, _slab_row(device), _lid_row(device)))
+
+
+def _circle_row(seen: Mapping[str, float]) -> Row:
+    """Row of Mohr's circle through the steady point, which ends at the consolidation stress."""
+    slope, cohesion = math.tan(math.radians(seen["friction_angle"])), seen["cohesion"]
+    shear, major = seen[f"shear_stress_{len(LOADS) + 1}"], seen["consolidation_stress"]
+    normal = shear / math.tan(math.radians(seen["steady_angle"]))
+    shear = min(shear, cohesion + slope * normal)
+    middle = (major**2 - normal**2 - shear**2) / (2 * (major - normal))
+    reach = (cohesion + slope * middle) / math.hypot(1.0, slope)
+    labels = (LID, "spheres", "distance of the yield locus over the circle's radius", "they touch")
+    return relative_row(labels, 1.0, reach / (major - middle), 1e-6)
 
 
 def _slab_row(device: str) -> Row:
