@@ -4,7 +4,7 @@ A sphere-step is one sphere of a grain moved on by one step. Grains of the rain 
 are moved on too, but meet nobody: `of free grains` leaves them out. The columns are simulated once and kept
 (`--columns`); worlds beyond `--seeds` hold the same columns at other moments.
 
-    python -m experiments.evidence.performance.heap_throughput --scale soft --device cpu --processes 2
+    python -m experiments.evidence.performance.heap_throughput --scale soft --device cpu
     python -m experiments.evidence.performance.heap_throughput --scale printed --device cuda --worlds 1,128
 
 Every table goes to `--out` as CSV, and all of them to throughput.md, which `performance_record` puts into
@@ -23,7 +23,6 @@ from dem_warp.solver import Solver
 from experiments.commands.options import OneDevice
 from experiments.evidence.machine import machine
 from experiments.evidence.performance.columns import MOMENTS, Columns
-from experiments.evidence.performance.parallel import processes_table
 from experiments.evidence.performance.result_pages import Part, parse_counts, write_results
 from experiments.evidence.performance.roofline import Traffic, copy_bandwidth, step_traffic
 from experiments.evidence.performance.timing import Timing, run_in, start, time_steps
@@ -77,21 +76,15 @@ def main(
     worlds: Annotated[str, typer.Option(help="Numbers of worlds to measure, such as 1,12,31,128.")] = "1",
     seeds: Annotated[int, typer.Option(help="Most columns to simulate beforehand.")] = 32,
     steps: Annotated[int, typer.Option(help="Steps of a stretch.")] = 2048,
-    processes: Annotated[int, typer.Option(help="Processes to run at once on the CPU.")] = 1,
     columns: Annotated[Path, typer.Option(help="Folder of simulated columns.")] = Path("out/columns"),
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/throughput"),
 ) -> None:
     """Measure, print and write the tables."""
     name, counts = resolve_device(device), parse_counts(worlds)
-    if name != "cpu" and processes > 1:
-        raise typer.BadParameter("--processes is for --device cpu")
     prepared = Columns(scale, min(max(counts), seeds), name, columns)
-    parts: list[Part] = []
     for parts in speed_tables(prepared, counts, steps):
-        write_results(out, "throughput", parts)
-    if processes > 1:
-        parts.append(processes_table(prepared, columns, processes, steps))
-    print(write_results(out, "throughput", parts).read_text(encoding="utf-8"))
+        page = write_results(out, "throughput", parts)
+    print(page.read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":
