@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from experiments.calibrate.campaign import Campaign
 from experiments.calibrate.plan.choice import ASSUMED, TestPlan, make_plan
 from experiments.calibrate.plan.knowledge import Size
-from experiments.calibrate.plan.present import fit_responses, present_of
+from experiments.calibrate.plan.present import Present, fit_responses, known_here
 from experiments.report.kit.html import Chapter, render_page
 from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, columns, make_table
-from experiments.report.material_card import material_card
 from experiments.studyfile import Study
 
 
@@ -23,11 +23,13 @@ def render_plan(plan: TestPlan, study: Study) -> str:
 
 def next_test(campaign: Campaign, study: Study) -> TestPlan | None:
     """Choose among candidates by what a campaign has simulated; None without candidates or a point."""
-    surface = campaign.surface
-    if not study.candidate_sections or surface is None or campaign.optimum is None:
+    surface, target = campaign.surface, campaign.target
+    if not study.candidate_sections or surface is None or target is None or campaign.optimum is None:
         return None
-    present = present_of(material_card(campaign, campaign.optimum, study), study.file)
-    scenes = set(surface.cases["scene"])
+    told = [replace(one, measured=target.responses[one.name]) for one in campaign.responses]
+    finals = {(r.scene, r.observable): own.final for r in told if (own := surface.responses.get(r.name))}
+    present = Present.of(surface.design.factors, known_here(finals, told, campaign.direct, surface.design))
+    scenes = set() if campaign.fidelity else set(surface.cases["scene"])  # those of a cheaper scale differ
     read = (one.response for each in study.candidates for one in each.readings)
     new = [one for one in read if one.scene in scenes and (one.scene, one.observable) not in present.known]
     fits = fit_responses(surface.design, surface.cases, new, study.campaign.surface)

@@ -109,6 +109,9 @@ def known_here(
 def present_of(card: Mapping[str, Any], place: Path) -> Present:
     """Return what a finished campaign knows, by its card; StudyError where it holds no surface."""
     surfaces, fitted = card_surfaces(card, place), card.get("fitted", {})
+    if fitted and not surfaces:
+        problem = "holds no surface: its campaign's design had a cheaper scale, or a bridge corrected it"
+        raise StudyError(str(place), problem, hint="The report of the campaign has the next test.")
     try:
         design = next(iter(surfaces.values())).design
         responses = [

@@ -105,6 +105,19 @@ def test_a_plan_after_a_campaign_takes_its_region(
     assert "must name a factor" in said
 
 
+def test_a_campaign_with_a_cheaper_scale_has_a_next_test(
+    write_study: Write, tmp_path: Path, seeds: list[int]
+) -> None:
+    scales = '[campaign.fidelity]\nscale = "soft"\n[scale.soft]\nnumerics.modulus_scale = 800.0\n'
+    study, campaign = write_study(add=CANDIDATES + scales), tmp_path / "campaign"
+    assert dem_warp("calibrate", study, "--out", campaign, "--device", "cpu")[0] == 0
+    page = (campaign / "report.html").read_text(encoding="utf-8")
+    assert "Next test: " in page
+    # a surface of the cheaper scale would be another one
+    assert "Not judged: wide: it was not simulated: run dem-warp plan" in page
+    assert "had a cheaper scale" in refused("plan", study, "--after", campaign)
+
+
 def test_the_cases_of_a_plan_are_forecast(write_study: Write) -> None:
     plan = planned(write_study(add=CANDIDATES), "--dry-run")
     assert [batch["name"] for batch in plan["batches"]] == ["test wide", "test target", "start, report"]
