@@ -26,9 +26,9 @@ def next_test(campaign: Campaign, study: Study) -> TestPlan | None:
     surface, target = campaign.surface, campaign.target
     if not study.candidate_sections or surface is None or target is None or campaign.optimum is None:
         return None
-    told = [replace(one, measured=target.responses[one.name]) for one in campaign.responses]
-    finals = {(r.scene, r.observable): own.final for r in told if (own := surface.responses.get(r.name))}
-    present = Present.of(surface.design.factors, known_here(finals, told, campaign.direct, surface.design))
+    matched = [replace(one, measured=target.responses[one.name]) for one in campaign.responses]
+    finals = {(r.scene, r.observable): own.final for r in matched if (own := surface.responses.get(r.name))}
+    present = Present.of(surface.design.factors, known_here(finals, matched, campaign.direct, surface.design))
     scenes = set() if campaign.fidelity else set(surface.cases["scene"])  # those of a cheaper scale differ
     read = (one.response for each in study.candidates for one in each.readings)
     new = [one for one in read if one.scene in scenes and (one.scene, one.observable) not in present.known]
