@@ -112,11 +112,6 @@ def angle(
 
         pictures = photographs.expanded(pictures)
         _require_one_form({"--target": as_target, "--csv": as_csv, "--json": as_json})
-        of_heaps = {
-            "--plate": plate, "--heap": heap_number, "--elevation": elevation, "--distance": distance,
-            "--unit": unit, "--plate-height": plate_height, "--type": types,
-        }  # fmt: skip
-        _require_subject(drum, {"--circle": circle, "--diameter": diameter}, of_heaps)
         view = _view(crop, plate, heap_number, elevation, distance, circle)
         heaps = heap_settings(unit, plate_height, types)
         options = photographs.PictureOptions(fit, view, heaps, by, keep_doubtful, drum, _length(diameter))
@@ -162,17 +157,6 @@ def _require_one_form(chosen: Mapping[str, bool]) -> None:
         *others, last = chosen
         problem = f"only one of {', '.join(others)} and {last} is possible"
         raise InputError(given[1], problem, " ".join(given), "Each is the whole output.")
-
-
-def _require_subject(drum: bool, of_drums: Mapping[str, Any], of_heaps: Mapping[str, Any]) -> None:
-    """Refuse options of drums for heaps, and of heaps for drums."""
-    from experiments.io.errors import InputError
-
-    wrong = [option for option, value in (of_heaps if drum else of_drums).items() if value is not None]
-    if wrong:
-        raise InputError(
-            wrong[0], f"is an option of {'heaps, not of drums' if drum else 'drums: add --drum'}"
-        )
 
 
 def _length(text: str | None) -> float | None:

@@ -83,8 +83,10 @@ def heap_settings(unit: str | None, plate_height: str | None, types: str | None 
 
 
 def is_heap_file(path: Path) -> bool:
-    """Return True if the content of a file is spheres; False for a picture or a missing file."""
-    return path.is_file() and format_of(path) is not None
+    """Return True if the content of a file is spheres; False for a picture or an unreadable file."""
+    with suppress(InputError):
+        return path.is_file() and format_of(path) is not None
+    return False
 
 
 def measure_heap_file(path: Path, fit: str, settings: HeapSettings) -> MeasuredHeap:

@@ -46,6 +46,12 @@ from imaging.geometry import Picture
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".heic", ".heif")
 """Endings of the pictures in a folder."""
+USES = {
+    "photograph": ("crop", "plate", "heap", "elevation", "distance", "focal_length", "least_focal_length"),
+    "picture of a drum": ("crop", "drum", "circle", "diameter"),
+    "file of spheres": ("unit", "plate_height", "types"),
+}
+"""Known facts that the measurement of each subject uses."""
 LEVEL = 0.95
 """Confidence level of all intervals."""
 ROW_VALUES = (
@@ -83,6 +89,18 @@ class PictureOptions:
     def subject(self) -> str:
         """Subject of the pictures: heap, or drum."""
         return drum_pictures.DRUM if self.drum else "heap"
+
+    def require_used(self, picture: Path) -> None:
+        """Refuse known facts that the measurement of a picture would not use."""
+        facts = vars(self.view) | vars(self.heaps) | {"drum": self.drum or None, "diameter": self.diameter}
+        photograph, drum, spheres = USES
+        subject = spheres if is_heap_file(picture) else drum if self.drum else photograph
+        for right, names in USES.items():
+            if wrong := [n for n in names if n not in USES[subject] and facts[n] not in (None, ())]:
+                problem = f"is for a {right}; this file is read as a {subject}"
+                alone = "Leave it out, or measure this file by itself."
+                hint = "Use --drum." if (right, subject) == (drum, photograph) else alone
+                raise InputError(f"{picture}, {wrong[0]}", problem, hint=hint)
 
     def heap_of(self, picture: Path, number: int) -> Hashable:
         """Return the heap that a picture shows, given its number."""
@@ -149,6 +167,8 @@ def measure_pictures(
     FitSettings.of(options.fit)
     if overlay_folder and any(folder.is_file() for folder in (overlay_folder, *overlay_folder.parents)):
         raise InputError("--overlay", "must be a folder, not a file", str(overlay_folder))
+    for picture in filter(os.path.isfile, pictures):
+        options.require_used(picture)
     rows = []
     for picture, name in zip(pictures, drawn_names(pictures), strict=True):
         rows.append(_measured_row(picture, options, overlay_folder / name if overlay_folder else None))

@@ -343,8 +343,11 @@ def _pictured(row: Row, fit: str, size: ValueLimits) -> Iterator[np.ndarray]:
     path, place = row.file.parent / row["picture"], row.place("picture")
     if not os.path.isfile(path):  # unlike Path.is_file, it accepts names that are too long
         raise row.error(f"no such file: {path}", "picture")
+    spheres = is_heap_file(path)
+    if row[unused := "pixel" if spheres else "type"]:
+        raise row.error(f"is for {'photographs' if spheres else 'files of spheres'}, unlike {path}", unused)
     try:
-        if is_heap_file(path):
+        if spheres:
             heap = measure_heap_file(path, fit, heap_settings(None, None, row["type"]))
             height = max(heap_shape(view.outline).height for view in heap.angle.views)
             size.require_height(height, "Check its unit of length.", f" in {row['picture']}", place)

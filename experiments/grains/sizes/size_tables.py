@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -21,8 +22,19 @@ SIEVE_COLUMNS = (
     "opening", "number", "retained", "retained_percent", "passing_percent", "cumulative_retained_percent",
 )  # fmt: skip
 COUNT_COLUMNS = ("diameter", "from", "to", "count")
-PANS, SUMS = ("pan", "receiver", "tray", "bottom", "base", "fines"), ("total", "sum")
-"""Openings in words: none at all, and rows that are no sieves."""
+PANS = ("pan", "receiver", "tray", "bottom", "base", "fines", "boden", "pfanne", "schale", "fond", "bandeja")
+SUMS = ("total", "sum", "som", "gesamt")
+"""Beginnings of openings in words: none at all, and rows that are no sieves."""
+_HEADS = {
+    "opening": "opening|aperture|size|diamet|weite|korngr|kornkl|durchmesser|maille|ouverture|abertura|malla"
+    "|^(sieve|sieb|tamis|tamiz|class|klasse|range)$",
+    "passing": "passing|finer|undersize|durchgang|passant|tamisat|pasa",
+    "retained": "retain|ruckstand|refus|reteni|anteil",
+    "mass": "^(mass|masse|masa|weight|gewicht|poids|peso)$",
+    "cumulative": "cum|kum|summe",
+    "share": "%|percent|prozent|pourcent|porcent",
+}
+"""Names of columns in English, German, French and Spanish, without accents."""
 _MESHES = {
     "3.5": 5.6, "4": 4.75, "5": 4.0, "6": 3.35, "7": 2.8, "8": 2.36, "10": 2.0, "12": 1.7, "14": 1.4,
     "16": 1.18, "18": 1.0, "20": 0.85, "25": 0.71, "30": 0.6, "35": 0.5, "40": 0.425, "45": 0.355, "50": 0.3,
@@ -31,8 +43,10 @@ _MESHES = {
 }  # fmt: skip
 """Opening of each sieve by its number [mm]: ASTM E11, table 1, alternative designations."""
 _MESH = re.compile(r"(?:#|no\.?)\s*([\d.]+)|([\d.]+)[\s-]*mesh", re.IGNORECASE)
-_UNIT = re.compile(r"[(\[]([^()\[\]]*)[)\]]")
-"""Unit in the brackets of a column's name."""
+_UNIT = re.compile(r"[(\[]([^()\[\]]*)[)\]]|[\s,/]+(?:in |en )?([mµu]m|k?g|%)$")
+"""Unit in the brackets of a column's name, or at its end."""
+_CLASS = re.compile(r"([\d.]+)\s*(?:[mµμu]m)?\s*(?:[-–—…]|\.\.+|to|bis|à|a)\s*([\d.]+)\s*([a-zµμ]*)")
+"""Class of grains between two openings."""
 
 
 def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
@@ -41,19 +55,25 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
     Columns: ``opening``, and one of ``retained`` (mass on the sieve), ``retained_percent``,
     ``passing_percent`` and ``cumulative_retained_percent``, or what sheets call them (see `_sieve_column`);
     of several the first in this order counts. The opening of a pan is 0 or in words, here or as its
-    ``number``; ``#40`` and ``40 mesh`` are of ASTM E11. ``unit`` is that of openings without one. Return the
-    distribution by mass between the finest and the coarsest opening, and the part of the mass beyond them.
+    ``number``; ``#40`` and ``40 mesh`` are of ASTM E11; ``2-4.75`` is what a sieve of 2 retains below one of
+    4.75. ``unit`` is that of openings without one. Return the distribution by mass between the finest and
+    the coarsest opening, and the part of the mass beyond them.
     """
     header = UnitHeader(_sieve_column)
     found = list(read_rows(path, ("opening",), SIEVE_COLUMNS, header))
     column = _one_of(path, found, SIEVE_COLUMNS[2:])
     _at_least(path, found, 2)
     unit = header.units.get("opening") or unit
-    sieves = [(_opening(row, unit), row) for row in found if _name(row) not in SUMS]
-    openings, rows = zip(*sorted(sieves, key=lambda sieve: sieve[0]), strict=True)
+    sieves = [(*_ends(row, unit), row) for row in found if not _name(row).startswith(SUMS)]
+    openings, tops, rows = zip(*sorted(sieves, key=lambda sieve: sieve[0]), strict=True)
     for row, (finer, coarser) in zip(rows[1:], pairwise(openings), strict=True):
         if not coarser > finer:
             raise row.error("must be another opening than that of the other rows", "opening")
+    for row, top, coarser in zip(rows, tops, (*openings[1:], tops[-1]), strict=True):
+        if top and not column.startswith("retained"):
+            raise row.error("may have two ends only in a table of what each class retains", "opening")
+        if top and not math.isclose(top, coarser):
+            raise row.error("must end at the opening that the next row begins with", "opening")
     values = [_number(row, column, "mass" if column == "retained" else "") for row in rows]
     _one_kind(rows, column)
     if column == "cumulative_retained_percent":
@@ -66,7 +86,7 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
             problem = f"must add up to 100 within {ROUNDING:g}"
             raise InputError(f"{path}: retained_percent", problem, f"{total:g}")
     # grains on a sieve are larger than its opening, and smaller than the next
-    classes = zip(openings, openings[1:], on_each, strict=False)
+    classes = zip(openings, (*openings[1:], *filter(None, tops[-1:])), on_each, strict=False)
     between = [(low, high, on) for low, high, on in classes if low > 0.0]
     kept = sum(on for *_, on in between)
     if not kept > 0.0:
@@ -85,7 +105,7 @@ class UnitHeader:
         names: list[str] = []
         for cell in cells:
             match = _UNIT.search(cell)
-            plain, unit = _UNIT.sub("", cell).strip(), match[1].strip() if match else ""
+            plain, unit = _UNIT.sub("", cell).strip(), (match[1] or match[2]).strip() if match else ""
             name = self.column(plain, unit)
             names.append("" if name in names else name)
             if name and unit and name == names[-1]:
@@ -97,23 +117,34 @@ class UnitHeader:
 
 def _sieve_column(name: str, unit: str) -> str:
     """Return the column of `SIEVE_COLUMNS` that a laboratory's name means, or an empty text."""
-    letters, share = re.sub(r"[^a-z]", "", name.lower()), "%" in name + unit or "percent" in name.lower()
+    plain = unicodedata.normalize("NFKD", name.lower())
+    letters = re.sub(r"[^a-z]", "", plain)
+    means = {each for each, words in _HEADS.items() if re.search(words, letters)}
+    share = re.search(_HEADS["share"], plain + unit)
     if name in SIEVE_COLUMNS:
         return name
     if letters in ("mesh", "meshno", "meshnumber", "sieveno", "sievenumber"):
         return "number"
-    if re.search("opening|aperture|size|diameter", letters) or letters == "sieve":
+    if "opening" in means:
         return "opening"
-    if re.search("passing|finer|undersize", letters) and (share or not unit):
+    if "passing" in means and (share or not unit):
         return "passing_percent"
-    if "retain" in letters and share:
-        return "cumulative_retained_percent" if letters.startswith("cum") else "retained_percent"
-    alone = letters in ("mass", "weight") or ("retain" in letters and not letters.startswith("cum"))
-    return "retained" if alone else ""
+    if "retained" in means and share:
+        return "cumulative_retained_percent" if "cumulative" in means else "retained_percent"
+    return "retained" if "mass" in means or ("retained" in means and "cumulative" not in means) else ""
 
 
 def _name(row: Row) -> str:
-    return (row["opening"] or row["number"]).lower()
+    """Return an opening's text; a comma before one, two, four or more digits is a decimal one."""
+    return re.sub(r"(\d),(\d\d?(?!\d)|\d{4})", r"\1.\2", (row["opening"] or row["number"]).lower())
+
+
+def _ends(row: Row, unit: str | None) -> tuple[float, float | None]:
+    """Return the opening below the grains of a row [m], and the one above where the row names both."""
+    if match := _CLASS.fullmatch(_name(row)):
+        low, high = (_length(row, "opening", unit, True, f"{each} {match[3]}") for each in match.group(1, 2))
+        return min(low, high), max(low, high)
+    return _opening(row, unit), None
 
 
 def _opening(row: Row, unit: str | None) -> float:
@@ -126,7 +157,9 @@ def _opening(row: Row, unit: str | None) -> float:
                 "must be a sieve of ASTM E11, from 3.5 to 635, or a length with its unit", "opening"
             )
         return 1e-3 * _MESHES[number]
-    return 0.0 if word in PANS or word.startswith("<") else _length(row, "opening", unit, zero=True)
+    if word.startswith((*PANS, "<", "≤")):
+        return 0.0
+    return _length(row, "opening", unit, True, word.lstrip(">≥ "))
 
 
 def read_counts(path: Path, unit: str | None = None, column: str | None = None) -> Tabulated:
@@ -195,10 +228,10 @@ def _count(row: Row) -> float:
     return 1.0 if "count" not in row.cells else _number(row, "count", "")
 
 
-def _length(row: Row, column: str, unit: str | None, zero: bool = False) -> float:
-    """Read a diameter [m]; it may be 0 only where `zero` allows it."""
+def _length(row: Row, column: str, unit: str | None, zero: bool = False, text: str = "") -> float:
+    """Read a diameter [m] from a cell, or a text in it; it may be 0 only where `zero` allows it."""
     try:
-        quantity = Quantity.parse(row[column])
+        quantity = Quantity.parse(text or row[column])
         if zero and quantity.number == 0.0:
             return 0.0
         value = Quantity(quantity.number, quantity.unit or unit or "").to_base("length")

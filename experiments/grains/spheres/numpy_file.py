@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
-from experiments.grains.spheres.sphere_file import TYPES, Columns, Format, SphereFile, spheres_of
+from experiments.grains.spheres.sphere_file import LARGEST, TYPES, Columns, Format, SphereFile, spheres_of
 from experiments.io.errors import InputError
 
 CENTERS, RADII = ("centers", "centres", "position", "positions", "xyz"), ("radius", "radii", "r")
@@ -17,8 +19,10 @@ def _read(path: Path) -> SphereFile:
     try:
         loaded = np.load(path)  # objects are refused: they could run code
         named = getattr(loaded, "files", None)
+        if named is not None and (size := sum(each.file_size for each in loaded.zip.infolist())) > LARGEST:
+            raise ValueError(f"it unpacks to {size:,} bytes, more than {LARGEST:,}")
         arrays = {"": loaded} if named is None else {name.lower(): loaded[name] for name in named}
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError, EOFError, NotImplementedError, BadZipFile, zlib.error) as error:
         raise InputError(str(path), f"NumPy cannot read the file: {error}") from None
     centers, radii = (next((arrays[n] for n in names if n in arrays), None) for names in (CENTERS, RADII))
     if centers is not None and radii is not None and len(centers) == len(radii):

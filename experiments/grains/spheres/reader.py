@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, cast
@@ -89,8 +90,8 @@ def head_of(path: Path) -> str:
     with _opened(path) as file:
         data = file.read(HEAD)
     head = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
-    # A format needs complete lines.
-    return head if len(data) < HEAD else head.rpartition("\n")[0]
+    # A format of text needs complete lines.
+    return head if len(data) < HEAD or "\0" in head else head.rpartition("\n")[0]
 
 
 def format_of(path: Path) -> Format | None:
@@ -149,10 +150,11 @@ def read_spheres(path: Path, largest: int = LARGEST) -> SphereFile:
 def _read_copy(packed: IO[bytes], path: Path, found: Format, largest: int) -> SphereFile:
     with TemporaryDirectory() as folder:
         copy = Path(folder) / path.name.removesuffix(".gz")
-        content = packed.read(largest + 1)
-        if len(content) > largest:
-            raise InputError(str(path), f"must have at most {largest:,} bytes when decompressed")
-        copy.write_bytes(content)
+        with copy.open("wb") as unpacked:
+            for block in iter(partial(packed.read, 1 << 20), b""):
+                unpacked.write(block)
+                if unpacked.tell() > largest:
+                    raise InputError(str(path), f"must have at most {largest:,} bytes when decompressed")
         try:
             return found.read(copy)
         except InputError as error:

@@ -5,14 +5,25 @@ VTKHDF is the particle file of ON-DEM, the network of DEM codes (COST action CA2
 
 from __future__ import annotations
 
+import mmap
 import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.grains.spheres.sphere_file import TYPES, Columns, Format, SphereFile, spheres_of
+from experiments.grains.spheres.sphere_file import (
+    LARGEST,
+    MANY,
+    MOST,
+    TYPES,
+    Columns,
+    Format,
+    SphereFile,
+    spheres_of,
+)
 from experiments.io.errors import InputError
+from experiments.io.files import check_file
 
 RADII, DIAMETERS = ("radius", "radii", "r"), ("diameter",)
 BODIES = ("grain", "id_multisphere", "clumpid", "clump_id", "mol")
@@ -21,6 +32,9 @@ _ENDINGS = {
     "PolyData": ".vtp", "UnstructuredGrid": ".vtu",
     "PPolyData": ".pvtp", "PUnstructuredGrid": ".pvtu", "Collection": ".pvd",
 }  # fmt: skip
+_COUNT = re.compile(rb'\b(NumberOf\w+|POINTS)[\s="]+(\d+)')
+_PART, _TIME = re.compile(rb'\bSource="([^"]+)"'), re.compile(rb'\bfile="([^"]+)"')
+"""Counts in a file, and the files of a whole in parts or of times, of which the last is read."""
 HDF, _HDF_ENDING = "\x89HDF", ".hdf"
 """First bytes of an HDF5 file; of these, VTK's have the group VTKHDF."""
 _HDF_KINDS = ("PolyData", "UnstructuredGrid")
@@ -33,6 +47,7 @@ def _read(path: Path) -> SphereFile:
     import pyvista
 
     ending = _ending(path)
+    _check_counts(path)
     try:
         with pyvista.vtk_verbosity("off"):
             grid = _last_grid(pyvista.get_reader(str(path), force_ext=ending))
@@ -88,6 +103,25 @@ def _ending(path: Path) -> str:
     if kind not in _ENDINGS:
         raise InputError(str(path), f"the type of the VTK file must be {' or '.join(_ENDINGS)}", kind)
     return _ENDINGS[kind]
+
+
+def _check_counts(path: Path) -> None:
+    """Refuse a file that says it has too many points or values, before VTK makes room for them."""
+    check_file(path, LARGEST)
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        found = [(kind, int(count)) for kind, count in _COUNT.findall(content)]
+        parts = _PART.findall(content) or _TIME.findall(content)[-1:]
+    width = sum(count for kind, count in found if kind == b"NumberOfComponents")
+    most = max((count for kind, count in found if kind != b"NumberOfComponents"), default=0)
+    if most > MOST:
+        raise InputError(str(path), f"must have at most {MOST:,} spheres", f"{most:,}", MANY)
+    if 4 * width * most > LARGEST:
+        raise InputError(
+            str(path), f"must unpack to at most {LARGEST:,} bytes", f"{4 * width * most:,}", MANY
+        )
+    for part in parts:
+        if (other := path.parent / part.decode("utf-8", errors="replace")).is_file():
+            _check_counts(other)
 
 
 def _check_hdf(path: Path) -> None:

@@ -164,6 +164,16 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
         ("opening,retained\n1,3\n", "mm", r"sizes.csv: needs 2 rows or more .*got 1"),
         ("opening\n1\n2\n", "mm", r"sizes.csv: needs one column of retained, .*got none"),
         (
+            "opening,retained\n1-2,3\n2.5-3,4\n",
+            "mm",
+            r"sizes.csv:2: opening: must end at the opening that the next row begins with, got 1-2",
+        ),
+        (
+            "opening,passing_percent\n1-2,3\n2-3,40\n",
+            "mm",
+            r"sizes.csv:2: opening: may have two ends only in a table of what each .* retains, got 1-2",
+        ),
+        (
             "# 3 sieves, dry\nopening,passing_percent\n0.4 mm,2\n#31,20\n#20,100\n",
             None,
             r"sizes.csv:4: opening: must be a sieve of ASTM E11, .*, got #31",
@@ -310,6 +320,16 @@ SHEETS = {
     "cumulative": "Size (mm),Cumulative retained (%)\n2,0\n1,30\n0.5,90\nPan,100\n",
     "by numbers": "# of a lecture\nopening,retained_percent\n#10,0\nNo. 18,30\n35 mesh,60\nPan,10\n",
     "numbers alone": "Sieve (mesh),% passing\n10,100\n18,70\n35,10\n",
+    "classes": "Size class (mm),Mass retained (g)\n1.00-2.00,30\n0.50-1.00,60\n<0.50,10\n>2,0\n",
+    "classes without their ends": "opening,retained\n1 - 2 mm,30\n500–1000 um,60\nPan,10\n",
+    "German": "Maschenweite [mm];Rückstand [g];Durchgang [%]\n2,0;0;100\n1,0;30;70\n0,5;60;10\nBoden;10;\n",
+    "German classes": "Kornklasse in mm;Rückstand in %\n> 2,00;0\n1,00 - 2,00;30\n0,50 bis 1,00 mm;60\n"
+    "<0,50;10\nSumme;100\n",
+    "German, what passes": "Siebweite (mm);Summe Durchgang (%)\n2;100\n1;70\n0,5;10\n",
+    "French": "Ouverture de maille (mm);Refus cumulé (%)\n2;0\n1;30\n0,5;90\nFond;100\n",
+    "French masses": "Tamis (mm);Refus partiel (g)\n2;0\n1;30\n0,5;60\nFond;10\nSomme;100\n",
+    "Spanish": "Abertura (mm);% que pasa\n2;100\n1;70\n0,5;10\n",
+    "Spanish masses": "Tamiz, mm\tPeso retenido, g\n2\t0\n1\t30\n0,5\t60\nBandeja\t10\nTotal\t100\n",
     "a column of numbers": "Mesh,Mass retained (g)\n#10,0\n18,30\n35,60\nPan,10\n",
     "a pan among the numbers": "Sieve No.,Opening (mm),Retained (g)\n10,2,0\n18,1,30\n35,0.5,60\n"
     "Pan,,10\nTotal,,100\n",

@@ -134,8 +134,14 @@ def test_the_command_reads_drums(drums: Path) -> None:
     ("options", "message"),
     [
         ((), "shows a rotating drum. Use --drum."),
-        (("--drum", "--plate", "1,2,3,4"), "--plate: is an option of heaps, not of drums"),
-        (("--circle", "1,2,3"), "--circle: is an option of drums: add --drum"),
+        (
+            ("--drum", "--plate", "1,2,3,4"),
+            "0.png, plate: is for a photograph; this file is read as a picture of a drum.",
+        ),
+        (
+            ("--circle", "1,2,3"),
+            "0.png, circle: is for a picture of a drum; this file is read as a photograph. Use --drum.",
+        ),
         (("--drum", "--circle", "1,2"), "--circle: must be three numbers X,Y,R, got 1,2"),
         (("--drum", "--diameter", "-1 mm"), "--diameter: must be positive, got -1 mm"),
     ],

@@ -25,6 +25,30 @@ def test_two_forms_of_the_result_at_once_are_refused(tmp_path: Path, forms: tupl
 
 
 @pytest.mark.parametrize(
+    ("option", "subject"),
+    [
+        (("--crop", "1,2,3,4"), "photograph"),
+        (("--elevation", "0"), "photograph"),
+        (("--plate", "1,9,30,9"), "photograph"),
+        (("--circle", "1,2,3"), "picture of a drum"),
+        (("--drum",), "picture of a drum"),
+        (("--unit", "mm"), "file of spheres"),
+        (("--plate-height", "0 mm"), "file of spheres"),
+        (("--type", "1"), "file of spheres"),
+    ],
+)
+def test_an_option_that_a_file_does_not_use_is_named(
+    tmp_path: Path, option: tuple[str, ...], subject: str
+) -> None:
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0, 200), Camera(noise=0)))
+    (tmp_path / "heap.csv").write_text("x,y,z,r\n0,0,1,1\n2,0,1,1\n", encoding="utf-8")
+    name = "heap.png" if subject == "file of spheres" else "heap.csv"
+    err = refused("angle", tmp_path / name, *option)
+    assert f"{name}, {option[0].strip('-').replace('-', '_')}" in err
+    assert f"is for a {subject}; this file is read as a" in err
+
+
+@pytest.mark.parametrize(
     ("error", "reason"),
     [
         (MemoryError(), "does not fit into memory"),
