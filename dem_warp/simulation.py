@@ -16,6 +16,15 @@ from dem_warp.processes import REPORT_EVERY, Processes, Report
 from dem_warp.result import CaseResult, OnProgress, OnResult, Progress
 
 
+def _short(result: CaseResult) -> str:
+    """Write a result as one line; not in its class, whose file is in the engine's fingerprint."""
+    seen = "".join(f", {name} {value:.4g}" for name, value in result.observables.items())
+    return f"CaseResult({result.reason or result.status}, {len(result.positions)} grains{seen})"
+
+
+CaseResult.__repr__ = _short  # type: ignore[method-assign, assignment]
+
+
 def simulate(
     cases: Sequence[Case],
     device: str | None = None,

@@ -92,7 +92,9 @@ def climb(
         rule += f" With {', '.join(held)} held at the direct readings it did not cross the target."
     place, crossing = _crossing(path, kept) if end is ClimbEnd.CROSSED else (None, None)
     best = int(path["error"].abs().idxmin())
-    step = _stride(path, kept)
+    # the largest move of each factor between two steps: a bound may have shortened others
+    moves = path[list(kept)].diff().iloc[1:]
+    step = {name: float(moves[name].iloc[int(moves[name].abs().argmax())]) for name in kept}
     start_and_step = numbered_values("start", line.start) | numbered_values("step", step)
     moves = ", ".join(f"{name} by {move:+.4g}" for name, move in step.items())
     decisions = (
@@ -271,12 +273,6 @@ def _crossing(path: pd.DataFrame, kept: tuple[str, ...]) -> tuple[float, dict[st
     place = (1.0 - share) * labels[before] + share * labels[before + 1]
     point = (1.0 - share) * values[before] + share * values[before + 1]
     return float(place), dict(zip(kept, point.tolist(), strict=True))
-
-
-def _stride(path: pd.DataFrame, kept: tuple[str, ...]) -> dict[str, float]:
-    """Return the largest move of each factor between two steps (a bound may have shortened others)."""
-    moves = path[list(kept)].diff().iloc[1:]
-    return {name: float(moves[name].iloc[int(moves[name].abs().argmax())]) for name in kept}
 
 
 def _end_decision(

@@ -104,7 +104,10 @@ def explore_surface(study: Study, box: Box, runner: Runner) -> SurfaceResult:
     for response in responses:
         full = _fit(design, cases, response)
         reduced, rule = _reduce(full, settings, leads=response is responses[0])
-        values = _run_means(response_table(cases, response, design.coded.index.tolist()))
+        table = response_table(cases, response, design.coded.index.tolist())
+        count = np.isfinite(table).sum(axis=1)
+        # the mean of each row over what was measured
+        values = np.where(count > 0, np.nansum(table, axis=1) / np.maximum(count, 1), np.nan)
         found[response.name] = FittedResponse(values, full, reduced)
         decisions.append(_fit_decision(response, full, reduced, rule, settings))
     return SurfaceResult(found, cases, design, box.center, box.half_range, outside, tuple(decisions))
@@ -192,12 +195,6 @@ def _fit(design: Design, cases: pd.DataFrame, response: Response) -> Surface:
         return fit_surface(design.select(used["run"].tolist()), values)
     except DesignError as error:
         raise too_many_failed(cases, STAGE, f"cannot be fitted any more ({error})", response) from error
-
-
-def _run_means(response: np.ndarray) -> np.ndarray:
-    """Return the mean of each row over what was measured; NaN where nothing was."""
-    count = np.isfinite(response).sum(axis=1)
-    return np.where(count > 0, np.nansum(response, axis=1) / np.maximum(count, 1), np.nan)
 
 
 def _reduce(full: Surface, settings: SurfaceSettings, leads: bool) -> tuple[Surface, str]:

@@ -143,7 +143,8 @@ def clear_errors(advice: object = "") -> Iterator[None]:
             messages.print(f"Interrupted. {advice}")
             raise typer.Exit(INTERRUPTED) from None
         except BrokenExecutor as error:
-            what = str(error) if _are_lost_workers(error) else ENDED_OUTSIDE
+            module = sys.modules.get("experiments.cases.workers.workers")
+            what = str(error) if module and isinstance(error, module.WorkersLostError) else ENDED_OUTSIDE
             fail(f"{what} {advice}", FAILED_RUN)
         except MemoryError:
             fail(f"there is not enough memory: use fewer --workers. {advice}", FAILED_RUN)
@@ -185,11 +186,6 @@ def _is_input(error: ValueError) -> bool:
     kinds = [("experiments.io.errors", "InputError"), ("imaging", "PictureError"), ("doe", "DesignError")]
     loaded = (getattr(sys.modules.get(module), name, ()) for module, name in kinds)
     return isinstance(error, tuple(kind for kind in loaded if kind))
-
-
-def _are_lost_workers(error: BrokenExecutor) -> bool:
-    module = sys.modules.get("experiments.cases.workers.workers")
-    return module is not None and isinstance(error, module.WorkersLostError)
 
 
 def fail(message: str, code: int = BAD_INPUT) -> NoReturn:

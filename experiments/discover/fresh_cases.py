@@ -32,7 +32,10 @@ def cases_for(search: Search, measured: Measured, bank: Bank | None, seed: int) 
     Too few measured means need no case. A bank is searched for a gap first: without a gap no case is needed,
     and where a value may be a slip the data are analysed twice.
     """
-    if _fitted_means(search, measured) - len(search.study.factors) < LEAST_FREEDOM:
+    fitted = [condition.name for condition in search.study.conditions if not condition.held_out]
+    rows = [measured.values[name] for name in measured.conditions if name in fitted]
+    means = sum(int(np.isfinite(each).any(axis=0).sum()) for each in rows)
+    if means - len(search.study.factors) < LEAST_FREEDOM:
         return 0, 0
     likely, most = search_cases(search.settings, len(search.study.conditions))
     if bank is None:
@@ -41,10 +44,3 @@ def cases_for(search: Search, measured: Measured, bank: Bank | None, seed: int) 
         return 0, 0
     passes = 2 if find_slips(measured, fit_emulator(bank), search.settings) else 1
     return passes * likely, passes * most
-
-
-def _fitted_means(search: Search, measured: Measured) -> int:
-    """Measured means that may take part in a fit."""
-    fitted = [condition.name for condition in search.study.conditions if not condition.held_out]
-    rows = [measured.values[name] for name in measured.conditions if name in fitted]
-    return sum(int(np.isfinite(each).any(axis=0).sum()) for each in rows)

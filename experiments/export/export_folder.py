@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from dem_warp import Case
-from experiments.export.exporter import ExportedTest, Exporter, Translation
+from experiments.export.exporter import ExportedTest, Translation
 from experiments.export.exporters import EXPORTERS
-from experiments.export.laws import Translated
 from experiments.io.errors import InputError, Problem
 from experiments.io.files import write_text
 from experiments.io.plug_ins import calling, made_in
@@ -91,18 +90,12 @@ def readme(test: ExportedTest, to: str, translation: Translation) -> str:
         parts.append(_running(test, translation))
     if test.settings:
         parts.append("## Factors\n\n" + _table(("factor", "value"), list(test.settings.items())))
-    rows = [
-        (row.subject, row.here, row.there) for row in (_laws_row(test, exporter), *translation.translated)
-    ]
+    own = (f"the set `{test.case.laws.name}`", *(mechanism.name for mechanism in test.case.mechanisms))
+    rows = [("contact laws", ", ".join(own), f"{exporter.laws}. {exporter.differs}")]
+    rows += [(row.subject, row.here, row.there) for row in translation.translated]
     parts.append("## Translated\n\n" + _table(("what", "in dem-warp", f"in {exporter.code}"), rows))
     parts.append("## Grains\n\n" + _table(*_grain_rows(test.case)))
     return "\n".join(parts)
-
-
-def _laws_row(test: ExportedTest, exporter: Exporter) -> Translated:
-    named = f"the set `{test.case.laws.name}`"
-    own = ", ".join([named, *(mechanism.name for mechanism in test.case.mechanisms)])
-    return Translated("contact laws", own, f"{exporter.laws}. {exporter.differs}")
 
 
 def _grain_rows(case: Case[Any]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:

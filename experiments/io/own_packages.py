@@ -20,7 +20,8 @@ OWN = {
 
 def foreign_packages() -> list[tuple[str, Path]]:
     """Return the names that Python finds another package under, and its file; nothing is imported."""
-    found = {name: _file_of(name) for name in OWN}
+    specs = {name: find_spec(name) for name in OWN}
+    found = {name: Path((spec and spec.origin) or name) for name, spec in specs.items()}
     return [(name, path) for name, path in found.items() if not _is_own(name, path)]
 
 
@@ -35,11 +36,6 @@ def require_own_packages() -> None:
         place = path.parent if path.name == "__init__.py" else path
         remove = f"Uninstall {others[0]}" if others else f"Move or rename {place}"
         raise InputError(f"package {name}", problem, hint=f"{remove}; if it has overwritten files: {again}")
-
-
-def _file_of(name: str) -> Path:
-    spec = find_spec(name)
-    return Path(spec.origin or name) if spec else Path(name)
 
 
 def _is_own(name: str, path: Path) -> bool:

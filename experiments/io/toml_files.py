@@ -71,7 +71,8 @@ def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = (), array: bo
 
     Keys whose value is None are skipped; `path` is the key path of the document, `array` if of an array.
     """
-    arrays = {key: value for key, value in document.items() if _holds_tables(value)}
+    lists = {key: value for key, value in document.items() if isinstance(value, list | tuple)}
+    arrays = {key: value for key, value in lists.items() if value and isinstance(value[0], Mapping)}
     tables = {key: value for key, value in document.items() if isinstance(value, Mapping)}
     values = {key: value for key, value in document.items() if key not in arrays and key not in tables}
     lines = [f"{_key(key)} = {_value(value)}" for key, value in values.items() if value is not None]
@@ -83,10 +84,6 @@ def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = (), array: bo
     for key, items in arrays.items():
         parts += [toml_text(item, (*path, key), array=True).rstrip() for item in items]
     return "\n\n".join(parts) + "\n"
-
-
-def _holds_tables(value: Any) -> bool:
-    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], Mapping)
 
 
 def _key(key: str) -> str:

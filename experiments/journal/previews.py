@@ -59,8 +59,10 @@ class Previews:
         for world, view in zip(worlds, batch.solver.view(worlds), strict=True):
             facts = {"phase": batch.phase(world), "fraction": round(batch.fraction(world), 4)}
             # grains that still wait for their fall overlap
-            fallen = _only(batch.result(world), view.released[view.alive])
-            self.write(batch.case_name(world), fallen, facts)
+            result, fallen = batch.result(world), view.released[view.alive]
+            names = ("positions", "orientations", "sizes", "shapes")
+            shown = replace(result, **{name: getattr(result, name)[fallen] for name in names})
+            self.write(batch.case_name(world), shown, facts)
 
     def write(self, name: str, result: CaseResult, facts: dict[str, Any]) -> None:
         """Write the spheres of a case, whole or not at all."""
@@ -80,12 +82,6 @@ class Previews:
         """Wait until the cost of a preview is a small part of the time."""
         self.spent += cost
         self._due = time.monotonic() + max(EVERY, cost / SHARE)
-
-
-def _only(result: CaseResult, grains: np.ndarray) -> CaseResult:
-    """Return the result of some of the grains."""
-    names = ("positions", "orientations", "sizes", "shapes")
-    return replace(result, **{name: getattr(result, name)[grains] for name in names})
 
 
 def spheres_of(result: CaseResult) -> np.ndarray:

@@ -120,7 +120,8 @@ def _ending_of_files(folder: Path) -> ProgressNote:
 def _cases(folder: Path) -> dict[str, dict[str, Value]]:
     """Cases of the journal by their key; without one, those of the tables that an ended run has left."""
     cases: dict[str, dict[str, Value]] = {}
-    lines = [*read_lines(folder, f"{JOURNAL}/{CASES}", CASES_SHOWN)] or _cases_of_tables(folder)
+    lines = [*read_lines(folder, f"{JOURNAL}/{CASES}", CASES_SHOWN)]
+    lines = lines or [row for row in read_table(folder, "tables/cases.csv", CASES_SHOWN) if row.get("status")]
     for line in map(values_of, lines):
         key = str(line.get("case_key") or line.get("name") or len(cases))
         if "status" in line:  # the last to end comes last
@@ -128,10 +129,6 @@ def _cases(folder: Path) -> dict[str, dict[str, Value]]:
         else:
             cases.setdefault(key, {}).update(line)
     return cases
-
-
-def _cases_of_tables(folder: Path) -> list[dict[str, Any]]:
-    return [row for row in read_table(folder, "tables/cases.csv", CASES_SHOWN) if row.get("status")]
 
 
 def _stages_of_tables(folder: Path) -> list[StageNote]:

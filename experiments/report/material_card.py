@@ -22,7 +22,7 @@ from experiments.studyfile.card import MATERIAL, SECTIONS
 from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
 from experiments.studyfile.manifest import PLUG_INS
-from experiments.studyfile.solver_section import CORRECTED_FOR, LAWS, SolverSection, written
+from experiments.studyfile.solver_section import CORRECTED_FOR, LAWS, written
 
 CARD = "material.toml"
 
@@ -54,7 +54,9 @@ def write_material_card(campaign: Campaign, study: Study, folder: Path) -> Path 
 def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> dict[str, Any]:
     """Lay out a card as nested tables; clump files as the study names them."""
     chosen = with_factor_values(study.document, study.factor_sections, optimum.settings)
-    chosen["solver"] = _solver(study.solver)
+    solver = study.solver
+    corrected = solver.corrected_for if solver.corrected_for != solver.card_solver else None
+    chosen["solver"] = {LAWS: written(solver.laws)} | ({CORRECTED_FOR: corrected} if corrected else {})
     return {
         "format": FORMAT,
         "name": study.name,
@@ -64,11 +66,6 @@ def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> d
         **({SURFACE: surfaces} if (surfaces := _surfaces(campaign)) else {}),
         MATERIAL: copy.deepcopy({key: chosen[key] for key in SECTIONS if key in chosen}),
     }
-
-
-def _solver(solver: SolverSection) -> dict[str, Any]:
-    corrected = solver.corrected_for if solver.corrected_for != solver.card_solver else None
-    return {LAWS: written(solver.laws)} | ({CORRECTED_FOR: corrected} if corrected else {})
 
 
 def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:

@@ -12,7 +12,6 @@ from experiments.calibrate.results import (
     ClimbResult,
     NoiseFloorResult,
     ScreeningResult,
-    SelectionResult,
     SurfaceResult,
     TargetResult,
     VerificationResult,
@@ -123,10 +122,6 @@ def _screening(context: Context, result: ScreeningResult) -> Chapter:
     return chapter("screening", tables, [draw(screen, alpha, response) for draw in drawn])
 
 
-def _selection(context: Context, result: SelectionResult) -> Chapter:
-    return chapter("selection", {"reasons": stage_tables.selection_table(result, context.leading)})
-
-
 def _climb(context: Context, result: ClimbResult) -> Chapter:
     tables = {"path": stage_tables.climb_table(result, context.leading)}
     return chapter("climb", tables, [stage_charts.climb_chart(result, context.target, context.leading)])
@@ -179,7 +174,9 @@ _STAGES: dict[str, Callable[[Context, Any], Chapter]] = {
     "target": _target,
     "noise_floor": _noise_floor,
     "screening": _screening,
-    "selection": _selection,
+    "selection": lambda context, result: chapter(
+        "selection", {"reasons": stage_tables.selection_table(result, context.leading)}
+    ),
     "climb": _climb,
     "surface": _surface,
     "fidelity": _fidelity,

@@ -43,7 +43,8 @@ def pareto_chart(screen: ScreenResult, alpha: float, response: Response) -> Char
         more = {"orientation": "h", "customdata": rows[["effect"]]}
         add_bars(figure, sizes, rows.index, name, color, shown, **more)
     ends = [points.index[0], points.index[-1]]
-    levels = _critical_values(screen, alpha)
+    levels = {f"p = {level:g}": screen.critical_t(level) for level in sorted({alpha, 0.05}, reverse=True)}
+    levels["Bonferroni 0.05"] = screen.critical_t(0.05, bonferroni=True)
     for (name, value), dash in zip(levels.items(), ("dot", "dash", "solid"), strict=False):
         # Entries of the legend, as labels at near lines would run into one another.
         add_line(figure, [value, value], ends, f"{name}: {value:.2f}", INK, dash)
@@ -117,11 +118,6 @@ def verification_chart(result: VerificationResult, response: Response) -> Chart:
     figure.update_yaxes(ticks="", ticklabelstandoff=6, range=[-0.7, 1.7])
     caption = f"Fresh cases less target; the green band is the margin of ± {quantity(margin, response.unit)}."
     return Chart("verification-chart", caption, figure)
-
-
-def _critical_values(screen: ScreenResult, alpha: float) -> dict[str, float]:
-    values = {f"p = {level:g}": screen.critical_t(level) for level in sorted({alpha, 0.05}, reverse=True)}
-    return values | {"Bonferroni 0.05": screen.critical_t(0.05, bonferroni=True)}
 
 
 def _add_effects(

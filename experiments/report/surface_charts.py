@@ -69,7 +69,10 @@ def surface_charts(
     fit, pairs = result.leading.final, itertools.combinations(design.names, 2)
     planes = [Slice(fit, x, y, point, response) for x, y in pairs]
     contours = [_contour_chart(plane, result, optimum, target) for plane in planes]
-    return [_relief_chart(_strongest(planes), result, optimum, target), *contours]
+    fit = planes[0].surface
+    slopes = dict(zip(fit.design.names, np.abs(fit.quadratic_form.slopes), strict=True))
+    strongest = max(planes, key=lambda plane: slopes[plane.x] + slopes[plane.y])
+    return [_relief_chart(strongest, result, optimum, target), *contours]
 
 
 def residual_charts(surface: Surface, response: Response) -> list[Chart]:
@@ -89,12 +92,6 @@ def residual_charts(surface: Surface, response: Response) -> list[Chart]:
     figure.add_scatter(x=line, y=line, mode="lines", line={"color": MUTED, "dash": "dot"}, hoverinfo="skip")
     _add_runs(figure, surface.response, fitted)
     return [*charts, Chart("residual-actual", "Fitted against simulated values.", figure)]
-
-
-def _strongest(planes: list[Slice]) -> Slice:
-    fit = planes[0].surface
-    slopes = dict(zip(fit.design.names, np.abs(fit.quadratic_form.slopes), strict=True))
-    return max(planes, key=lambda plane: slopes[plane.x] + slopes[plane.y])
 
 
 def _relief_chart(

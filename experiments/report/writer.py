@@ -83,14 +83,11 @@ def write_files(
     whole = {"study": about, **results, "provenance": jsonable(made_by)}
     text = json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     for name, table in tables.items():
-        write_text(folder / "tables" / f"{name}.csv", _csv_text(table))
+        texts = table.select_dtypes(exclude="number")
+        safe = table.assign(**{each: texts[each].map(safe_cell) for each in texts})
+        write_text(folder / "tables" / f"{name}.csv", safe.to_csv(index=False))
     write_text(folder / "results.json", text)
     write_text(folder / PAGE, page)
-
-
-def _csv_text(table: pd.DataFrame) -> str:
-    texts = table.select_dtypes(exclude="number")
-    return table.assign(**{name: texts[name].map(safe_cell) for name in texts}).to_csv(index=False)
 
 
 def library_versions() -> dict[str, str]:

@@ -81,6 +81,7 @@ class Finding:
 def examine(resources: Resources, cache: Finding) -> list[Finding]:
     """Check everything that simulates or draws, and try both on a small heap; see `kernel_cache`."""
     versions = f"dem-warp {program_version()}, Warp {wp.__version__}, Python {platform.python_version()}"
+    used, scale = f"{resources}, {resources.count} at once", "paper" if resources.on_gpu else "bench"
     return [
         Finding("versions", True, versions),
         Finding("packages", True, f"{', '.join(OWN)}: all of dem-warp, in {ROOT}"),
@@ -93,7 +94,7 @@ def examine(resources: Resources, cache: Finding) -> list[Finding]:
         *_tried("OpenGL", lambda: [_opengl()]),
         *_tried("clusters", lambda: [_dask()]),
         *_tried("jobs", lambda: _submission(resources)),
-        Finding("will be used", True, _used(resources)),
+        Finding("will be used", True, f"{used}; the paper's study at the scale {scale}"),
         *_tried("speed", lambda: [_speed(resources)]),
     ]
 
@@ -122,11 +123,6 @@ def _plug_in(each: PlugIn) -> Finding:
     skipped = [f"skipped {one}, {skipped_for(one)}" for one, of, name in named if name not in REGISTRIES[of]]
     cure = f"Correct the entry (its warning has the rule), or uninstall {each.package}." if skipped else ""
     return Finding("plug-in", not skipped, "; ".join((str(each), *skipped)), cure=cure)
-
-
-def _used(resources: Resources) -> str:
-    scale = "paper" if resources.on_gpu else "bench"
-    return f"{resources}, {resources.count} at once; the paper's study at the scale {scale}"
 
 
 def _cores() -> list[Finding]:

@@ -42,6 +42,14 @@ def test_a_tube_is_filled_lifted_and_leaves_a_heap_at_rest(heap):
     assert np.hypot(*heap.sphere_centers.T[:2]).max() > SMALL_TUBE.diameter / 2
 
 
+def test_a_printed_result_is_one_line_with_its_numbers(heap):
+    text = str(heap)
+    assert text.startswith(f"CaseResult(finished, {len(heap.positions)} grains, grain_count ")
+    assert f"solid_fraction {heap.observables['solid_fraction']:.4g}" in text
+    assert "\n" not in text
+    assert len(text) < 400
+
+
 def test_the_mass_that_fills_the_tube_is_that_of_the_grains(heap):
     volume = PYRAMID.volume * (heap.sizes**3).sum()
     space = np.pi / 4.0 * SMALL_TUBE.diameter**2 * heap.observables["fill_height"]

@@ -11,7 +11,7 @@ from installation import Installed, build, pip
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
-BUILT_FROM = (*PACKAGES, "pyproject.toml", "setup.py", "README.md", "LICENSE")
+BUILT_FROM = (*PACKAGES, "dem_warp_command.py", "pyproject.toml", "setup.py", "README.md", "LICENSE")
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ from installation import Installed
 
 from experiments.io.own_packages import foreign_packages
 
-START = "from experiments.cli import main; main()"
+START = "from dem_warp_command import main; main()"
 
 
 def _run(work: Path, *sites: Path) -> tuple[int, str]:
@@ -24,7 +24,7 @@ def test_the_packages_of_this_tree_are_its_own() -> None:
     assert foreign_packages() == []
 
 
-@pytest.mark.parametrize("name", ["doe", "imaging"])
+@pytest.mark.parametrize("name", ["doe", "imaging", "experiments"])
 def test_a_package_that_is_found_first_is_named_with_its_folder(
     name: str, installed: Installed, tmp_path: Path
 ) -> None:

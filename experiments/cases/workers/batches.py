@@ -65,8 +65,10 @@ def plan_batches(
         sizes = [work_of(cases[i]) for i in group]
         grains = len(group) * max(size.grains for size in sizes)
         largest = cases[group[int(np.argmax([size.spheres for size in sizes]))]]
-        rounds = rounds_of(len(group), grains, workers, _worlds_held(largest, memory), sharing)
-        dealt += _dealt(members, rounds, workers)
+        held = max(min(int(MEMORY_SHARE * memory / device_bytes(largest)), WORLDS), 1)
+        rounds = rounds_of(len(group), grains, workers, held, sharing)
+        for part in np.array_split(members, rounds):  # batches of a round cost much the same
+            dealt += [part[w::workers].tolist() for w in range(min(workers, len(part)))]
     return sorted(dealt, key=lambda batch: -float(costs[batch].sum()))
 
 
@@ -80,20 +82,9 @@ def rounds_of(count: int, grains: float, workers: int, most: int = WORLDS, shari
     return max(round(grains / (workers * full)), math.ceil(count / (workers * most)), 1)
 
 
-def _worlds_held(largest: Case, memory: float) -> int:
-    """Return the number of worlds as large as a case that fit into memory [bytes], at most `WORLDS`."""
-    return max(min(int(MEMORY_SHARE * memory / device_bytes(largest)), WORLDS), 1)
-
-
 def _falling(costs: np.ndarray) -> np.ndarray:
     """Return the places of the costs, the highest first, equal ones in their order."""
     return np.argsort(-costs, kind="stable")
-
-
-def _dealt(members: np.ndarray, rounds: int, workers: int) -> list[list[int]]:
-    """Deal members out in rounds of a batch a worker; the batches of a round cost much the same."""
-    parts = np.array_split(members, rounds)
-    return [part[w::workers].tolist() for part in parts for w in range(min(workers, len(part)))]
 
 
 def device_bytes(case: Case[Any]) -> int:

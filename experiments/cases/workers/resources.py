@@ -44,7 +44,8 @@ class Resources:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be an address; Dask finds it late, with a traceback."""
-        if self.scheduler is not None and not _is_address(self.scheduler):
+        found = _ADDRESS.fullmatch(self.scheduler or "")
+        if self.scheduler is not None and not (found and 0 < int(found["port"]) < 65536):
             hint = "An example is tcp://HOST:8786."
             raise InputError("--scheduler", "must be the address of a Dask scheduler", self.scheduler, hint)
 
@@ -158,11 +159,6 @@ class Resources:
 def cpu_name(workers: int) -> str:
     """Return the name of this machine's CPU with a number of workers."""
     return f"{platform.node()}, CPU, {workers} {'worker' if workers == 1 else 'workers'}"
-
-
-def _is_address(text: str) -> bool:
-    found = _ADDRESS.fullmatch(text)
-    return found is not None and 0 < int(found["port"]) < 65536
 
 
 def resolve_devices(names: str | None) -> list[str]:

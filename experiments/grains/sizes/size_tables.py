@@ -61,7 +61,9 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
     """
     header = UnitHeader(_sieve_column)
     found = list(read_rows(path, ("opening",), SIEVE_COLUMNS, header))
-    column = _one_of(path, found, SIEVE_COLUMNS[2:])
+    column = next((name for name in SIEVE_COLUMNS[2:] if found and name in found[0].cells), None)
+    if column is None:
+        raise InputError(str(path), f"needs one column of {', '.join(SIEVE_COLUMNS[2:])}", "none")
     _at_least(path, found, 2)
     unit = header.units.get("opening") or unit
     sieves = [(*_ends(row, unit), row) for row in found if not _name(row).startswith(SUMS)]
@@ -123,6 +125,8 @@ def _sieve_column(name: str, unit: str) -> str:
     share = re.search(_HEADS["share"], plain + unit)
     if name in SIEVE_COLUMNS:
         return name
+    if re.search(r"[+&]|\b(with|and|mit|und|avec|et|con|y)\b", plain):
+        return ""  # a sieve and what it holds
     if letters in ("mesh", "meshno", "meshnumber", "sieveno", "sievenumber"):
         return "number"
     if "opening" in means:
@@ -259,13 +263,6 @@ def _one_kind(rows: Sequence[Row], column: str) -> None:
     for row, without in zip(rows, bare, strict=True):
         if without and not all(bare) and Quantity.parse(row[column]).number != 0.0:
             raise row.error("needs a unit like the other rows", column)
-
-
-def _one_of(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> str:
-    found = [name for name in columns if rows and name in rows[0].cells]
-    if not found:
-        raise InputError(str(path), f"needs one column of {', '.join(columns)}", "none")
-    return found[0]
 
 
 def _at_least(path: Path, rows: Sequence[Row], least: int) -> None:

@@ -12,18 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.grains.spheres.sphere_file import (
-    LARGEST,
-    MANY,
-    MOST,
-    TYPES,
-    Columns,
-    Format,
-    SphereFile,
-    spheres_of,
-)
+from experiments.grains.spheres.sphere_file import MANY, MOST, TYPES, Columns, Format, SphereFile, spheres_of
 from experiments.io.errors import InputError
-from experiments.io.files import check_file
 
 RADII, DIAMETERS = ("radius", "radii", "r"), ("diameter",)
 BODIES = ("grain", "id_multisphere", "clumpid", "clump_id", "mol")
@@ -32,7 +22,7 @@ _ENDINGS = {
     "PolyData": ".vtp", "UnstructuredGrid": ".vtu",
     "PPolyData": ".pvtp", "PUnstructuredGrid": ".pvtu", "Collection": ".pvd",
 }  # fmt: skip
-_COUNT = re.compile(rb'\b(NumberOf\w+|POINTS)[\s="]+(\d+)')
+_COUNT = re.compile(rb'\b(?:NumberOf\w+|POINTS)[\s="]+(\d+)')
 _PART, _TIME = re.compile(rb'\bSource="([^"]+)"'), re.compile(rb'\bfile="([^"]+)"')
 """Counts in a file, and the files of a whole in parts or of times, of which the last is read."""
 HDF, _HDF_ENDING = "\x89HDF", ".hdf"
@@ -106,19 +96,12 @@ def _ending(path: Path) -> str:
 
 
 def _check_counts(path: Path) -> None:
-    """Refuse a file that says it has too many points or values, before VTK makes room for them."""
-    check_file(path, LARGEST)
+    """Refuse a file that says it has too many points or cells, before VTK makes room for them."""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        found = [(kind, int(count)) for kind, count in _COUNT.findall(content)]
+        most = max(map(int, _COUNT.findall(content)), default=0)
         parts = _PART.findall(content) or _TIME.findall(content)[-1:]
-    width = sum(count for kind, count in found if kind == b"NumberOfComponents")
-    most = max((count for kind, count in found if kind != b"NumberOfComponents"), default=0)
     if most > MOST:
         raise InputError(str(path), f"must have at most {MOST:,} spheres", f"{most:,}", MANY)
-    if 4 * width * most > LARGEST:
-        raise InputError(
-            str(path), f"must unpack to at most {LARGEST:,} bytes", f"{4 * width * most:,}", MANY
-        )
     for part in parts:
         if (other := path.parent / part.decode("utf-8", errors="replace")).is_file():
             _check_counts(other)

@@ -40,7 +40,19 @@ def start_routes(place: StudyFolder) -> list[Route]:
     from starlette.routing import Route
 
     runs = StartedRuns(place.folder)
-    answers = answers_of(place, runs)
+    answers: dict[str, Answer] = {
+        "form": lambda asked: place.form(),
+        "clump": place.clump,
+        "angles": lambda asked: place.angles(asked["folder"], asked["fit"], asked.get("test", "")),
+        "draft": lambda asked: place.draft(asked["name"], asked["values"], asked["factors"]),
+        "check": lambda asked: place.checked(asked["file"], asked["text"]),
+        "write": lambda asked: {"file": place.write(asked["file"], asked["text"]).name},
+        "plan": lambda asked: _command(*plan(place, asked)),
+        "start": lambda asked: {"folder": runs.start(*plan(place, asked))},
+        "stop": lambda asked: runs.stop(asked["folder"]),
+        "resume": lambda asked: {"folder": runs.resume(asked["folder"])},
+        "runs": lambda asked: runs.listed(),
+    }
 
     def page(request: Request) -> Response:
         return page_file("ui.html")
@@ -69,23 +81,6 @@ def start_routes(place: StudyFolder) -> list[Route]:
         Route("/{token}/upload/{name:path}", upload, methods=["POST"]),
         *watch_routes(lambda request: runs.path(request.path_params["run"]), "/{token}/run/{run:path}/-"),
     ]
-
-
-def answers_of(place: StudyFolder, runs: StartedRuns) -> dict[str, Answer]:
-    """Answers by what the page asks for."""
-    return {
-        "form": lambda asked: place.form(),
-        "clump": place.clump,
-        "angles": lambda asked: place.angles(asked["folder"], asked["fit"], asked.get("test", "")),
-        "draft": lambda asked: place.draft(asked["name"], asked["values"], asked["factors"]),
-        "check": lambda asked: place.checked(asked["file"], asked["text"]),
-        "write": lambda asked: {"file": place.write(asked["file"], asked["text"]).name},
-        "plan": lambda asked: _command(*plan(place, asked)),
-        "start": lambda asked: {"folder": runs.start(*plan(place, asked))},
-        "stop": lambda asked: runs.stop(asked["folder"]),
-        "resume": lambda asked: {"folder": runs.resume(asked["folder"])},
-        "runs": lambda asked: runs.listed(),
-    }
 
 
 def answered(answer: Answer, body: bytes) -> Any:

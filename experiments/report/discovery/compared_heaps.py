@@ -67,11 +67,12 @@ def simulated_heaps(models: Mapping[str, CaseResult], condition: str, study: Stu
 
     They come from models by their titles, with the study under the condition; one without a heap is left out.
     """
-    heaps = {}
+    heaps, pixels = {}, max(PIXELS, study.measurement.pixels)
+    large = study.model_copy(update={"measurement": study.measurement.model_copy(update={"pixels": pixels})})
     for title, result in models.items():
         try:
             if result.status == "finished":
-                heaps[title] = drawn_heap(_in_large(study), result, view=0)
+                heaps[title] = drawn_heap(large, result, view=0)
         except PictureError:
             continue
     drawn = heaps.values()
@@ -113,8 +114,3 @@ def _shown(image: np.ndarray, angle: ReposeAngle, window: _Window, beyond: bool 
         return drawn
     rows_left = round(len(drawn) * WIDEST / drawn.shape[1])
     return cv2.resize(drawn, (WIDEST, rows_left), interpolation=cv2.INTER_AREA)
-
-
-def _in_large(study: Study) -> Study:
-    measurement = study.measurement.model_copy(update={"pixels": max(PIXELS, study.measurement.pixels)})
-    return study.model_copy(update={"measurement": measurement})

@@ -92,7 +92,8 @@ def gap_chart(found: Discovery) -> Chart:
         df = both.degrees_of_freedom
         line = {"color": GREEN, "width": 3}
         figure.add_shape(type="line", x0=df, x1=df, y0=at - 0.35, y1=at + 0.35, line=line)
-    figure.update_xaxes(type="log", dtick=1 if _decades(found) > 1.0 else "D2")
+    span = [end for both in found.before_after for end in (both.before.high, both.after.low) if end > 0.0]
+    figure.update_xaxes(type="log", dtick=1 if span and max(span) > 10.0 * min(span) else "D2")
     figure.update_yaxes(
         ticks="",
         ticklabelstandoff=6,
@@ -187,8 +188,3 @@ def _add_map(
 def _texts(values: np.ndarray, decimals: int) -> np.ndarray:
     texts = [fixed(value, decimals) if np.isfinite(value) else MISSING for value in values.ravel()]
     return np.array(texts, dtype=np.str_).reshape(values.shape)
-
-
-def _decades(found: Discovery) -> float:
-    ends = [end for both in found.before_after for end in (both.before.high, both.after.low) if end > 0.0]
-    return float(np.log10(max(ends) / min(ends))) if ends else 0.0

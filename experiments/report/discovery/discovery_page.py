@@ -71,13 +71,14 @@ def render_discovery(
         found = replace(found, base=None, gap=None, drifts=(), candidates=(), power=(), confounding=None)
     *chapters, last = _chapters(found, terms)
     shown = [chapter for chapter in chapters if pictures or chapter.name != "heaps"]
+    said = found.candidates[0].objection if found.candidates and found.verdict is Verdict.UNKNOWN else ""
     drawn_on = {
         "found": found,
         "study": study,
         "terms": terms,
         "headline": headline(found, terms),
         "sentence": verdict_sentence(found, terms),
-        "reason": _further_reason(found, terms),
+        "reason": "" if said and said in found.reason else reason_sentence(found, terms),
         "settled": found.verdict in SETTLED and not slip_decides(found),
         **_missed(found, terms),
         "cards": _cards(found, terms),
@@ -109,11 +110,6 @@ def _missed(found: Discovery, terms: Terms) -> dict[str, Any]:
         "conventions": conventions(found, terms) if unknown else [],
         "step_first": unknown or found.verdict is Verdict.TIE or slip_decides(found),
     }
-
-
-def _further_reason(found: Discovery, terms: Terms) -> str:
-    said = found.candidates[0].objection if found.candidates and found.verdict is Verdict.UNKNOWN else ""
-    return "" if said and said in found.reason else reason_sentence(found, terms)
 
 
 @dataclass(frozen=True)

@@ -140,18 +140,11 @@ def _setting(conditions: tuple[str, ...]) -> str:
 def _none(found: Discovery, terms: Terms) -> str:
     if found.base is None or found.gap is None:
         return reason_sentence(found, terms)
-    drifting, means = _drifting(found, terms), _single_means(found, terms)
+    moved = [terms.factors[drift.factor].label for drift in found.drifts if drift.p_value < DRIFTS]
+    drifting = say("verdict.drifting", names=enumeration(moved)) if moved else ""
+    apart = standing_out(found, terms)
+    means = say("verdict.single_means", means=" And ".join(apart)) if apart else ""
     return say("verdict.none", misfit=_q_and_p(found.base), drifting=drifting, means=means)
-
-
-def _single_means(found: Discovery, terms: Terms) -> str:
-    means = standing_out(found, terms)
-    return say("verdict.single_means", means=" And ".join(means)) if means else ""
-
-
-def _drifting(found: Discovery, terms: Terms) -> str:
-    drifting = [terms.factors[drift.factor].label for drift in found.drifts if drift.p_value < DRIFTS]
-    return say("verdict.drifting", names=enumeration(drifting)) if drifting else ""
 
 
 def _added(found: Discovery, terms: Terms) -> str:

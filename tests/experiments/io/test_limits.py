@@ -170,12 +170,6 @@ def test_a_frame_of_too_many_spheres_is_refused(tmp_path: Path, monkeypatch: pyt
                 read_spheres(tmp_path / name)
 
 
-def _zeros(shape: str, count: int) -> str:
-    """Write the beginning of a VTK file with arrays of this size, whose data VTK would first make room for."""
-    array = f'<DataArray type="Float32" NumberOfComponents="{count}" format="appended" offset="0"/>'
-    return f'<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="{shape}"><Points>{array}</Points>'
-
-
 def test_a_small_file_of_spheres_that_unpacks_to_much_is_refused_before(tmp_path: Path) -> None:
     """The archive and the gzipped table unpack to 600 MB; VTK makes room for as many values as are named."""
     with (
@@ -190,8 +184,9 @@ def test_a_small_file_of_spheres_that_unpacks_to_much_is_refused_before(tmp_path
         for _ in range(60):
             member.write(bytes(10_000_000))
             table.write(b"0,0,1,1\n" * 1_250_000)
-    (tmp_path / "many.vtp").write_text(_zeros("200000000", 3), encoding="utf-8")
-    (tmp_path / "wide.vtp").write_text(_zeros("1000000", 200), encoding="utf-8")
+    (tmp_path / "many.vtp").write_text(
+        '<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="200000000">', encoding="utf-8"
+    )
     (tmp_path / "long.vtk").write_text("# vtk DataFile Version 3.0\nx\nASCII\nPOINTS 3000000000 float\n")
     (tmp_path / "all.pvtu").write_text(
         '<VTKFile type="PUnstructuredGrid"><Piece Source="many.vtp"/></VTKFile>', encoding="utf-8"
@@ -201,7 +196,6 @@ def test_a_small_file_of_spheres_that_unpacks_to_much_is_refused_before(tmp_path
         ("heap.npz", "unpacks to 600,000,1.. bytes, more than 500,000,000"),
         ("heap.csv.gz", "at most 500,000,000 bytes when decompressed"),
         ("many.vtp", "at most 1,500,000 spheres, got 200,000,000"),
-        ("wide.vtp", "unpack to at most 500,000,000 bytes, got 800,000,000"),
         ("long.vtk", "at most 1,500,000 spheres, got 3,000,000,000"),
         ("all.pvtu", "many.vtp: must have at most 1,500,000 spheres"),
     ):

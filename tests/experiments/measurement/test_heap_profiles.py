@@ -128,6 +128,10 @@ def test_a_heap_that_the_test_cannot_give_is_refused_with_file_and_pixel(tmp_pat
     np.savetxt(tmp_path / "heap.csv", spheres, delimiter=",", header="x,y,z,radius", comments="")
     with pytest.raises(InputError, match=r"p.csv:2: picture: .* mm in .*heap.csv\. Check its unit"):
         read_heap_profiles(file(tmp_path, "1,heap.csv\n", "replicate,picture"), "flank", SIZE)
+    for row, heads in (("heap.csv,1 mm", "picture,pixel"), ("heap.png,1", "picture,type")):
+        unused = heads.partition(",")[2]
+        with pytest.raises(InputError, match=rf"p.csv:2: {unused}: is for .*, unlike .*{row[:8]}"):
+            read_heap_profiles(file(tmp_path, f"1,{row}\n", f"replicate,{heads}"), "flank", SIZE)
 
 
 def test_outlines_of_a_study_are_as_high_as_its_test_can_give(
