@@ -124,6 +124,7 @@ def dimension_of_unit(unit: str) -> str:
 
 def unit_size(unit: str, dimension: str) -> float:
     """Size of a unit in the base unit of its dimension; ValueError where it is not one of those."""
+    unit = unit.translate(_SPELLINGS)
     if not dimension and unit:
         raise ValueError(f"must be a plain number without the unit {unit!r}")
     known = UNITS[dimension] if dimension else {"": 1.0}

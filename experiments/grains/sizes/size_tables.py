@@ -26,12 +26,12 @@ PANS = ("pan", "receiver", "tray", "bottom", "base", "fines", "boden", "pfanne",
 SUMS = ("total", "sum", "som", "gesamt")
 """Beginnings of openings in words: none at all, and rows that are no sieves."""
 _HEADS = {
-    "opening": "opening|aperture|size|diamet|weite|korngr|kornkl|durchmesser|maille|ouverture|abertura|malla"
-    "|^(sieve|sieb|tamis|tamiz|class|klasse|range)$",
+    "opening": "opening|aperture|(?<!under)(?<!over)size|diamet|weite|korngr|kornkl|durchmesser|maille"
+    "|ouverture|abertura|malla|^(sieve|sieb|tamis|tamiz|class|klasse|range)$",
     "passing": "passing|finer|undersize|durchgang|passant|tamisat|pasa",
-    "retained": "retain|ruckstand|refus|reteni|anteil",
+    "retained": "retain|oversize|ruckstand|refus|reteni|anteil",
     "mass": "^(mass|masse|masa|weight|gewicht|poids|peso)$",
-    "cumulative": "cum|kum|summe",
+    "cumulative": "cum|kum|summe|oversize",
     "share": "%|percent|prozent|pourcent|porcent",
 }
 """Names of columns in English, German, French and Spanish, without accents."""
@@ -163,6 +163,8 @@ def _opening(row: Row, unit: str | None) -> float:
         return 1e-3 * _MESHES[number]
     if word.startswith((*PANS, "<", "≤")):
         return 0.0
+    if unit in ("um", "µm", "μm") and re.fullmatch(r"\d{1,3}\.\d{3}", word):
+        raise row.error("may be a thousand times as large: write it without a point", "opening")
     return _length(row, "opening", unit, True, word.lstrip(">≥ "))
 
 
@@ -248,7 +250,7 @@ def _length(row: Row, column: str, unit: str | None, zero: bool = False, text: s
 
 def _number(row: Row, column: str, dimension: str) -> float:
     try:
-        quantity = Quantity.parse(row[column])
+        quantity = Quantity.parse(row[column].rstrip("% "))
         value = quantity.to_base(dimension) if quantity.unit else quantity.number
     except ValueError as error:
         raise row.error(str(error), column) from None

@@ -27,7 +27,7 @@ from experiments.grains.spheres.sphere_file import (
 )
 from experiments.io.errors import InputError
 from experiments.io.texts import split
-from experiments.io.units import UNITS
+from experiments.io.units import UNITS, unit_size
 
 HEADER_LINES = 60
 """Largest number of the line with the names of the columns."""
@@ -37,11 +37,12 @@ _PLACE = r"(?:particle|sphere)?(?:position|pos|center|centre|coordinate|coord|po
 _SIZE = r"(?:particle|sphere|physical)*"
 _NAMES = {
     **{
-        axis: rf"{_PLACE}(?:{axis}|{n})|{axis}(?:position|pos|coordinate|coord)?"
+        axis: rf"{_PLACE}(?:{axis}|{n})|(?:particle|sphere)?{axis}(?:position|pos|coordinate|coord)?"
         for n, axis in enumerate("xyz")
     },
-    "r": rf"{_SIZE}(?:radius|radii|r)",
-    "d": rf"{_SIZE}(?:diameter|d)",
+    "r": rf"{_SIZE}(?:radius|radii|rad|r)",
+    "d": rf"{_SIZE}(?:diameter|d)|particlesize",
+    "time": "times?|timestep|frame",
     "body": "clumpid|idmultisphere|mol|grain|owner|particleid|clump",
     "type": "|".join(TYPES),
 }
@@ -88,14 +89,21 @@ def _read(path: Path) -> SphereFile:
     x, y, z, r = (kinds.index(kind) for kind in ("x", "y", "z", size))
     body, types = (kinds.index(kind) if kind in kinds else None for kind in ("body", "type"))
     columns = Columns(x, y, z, r, size == "d", body, types)
-    rows: Iterable[Row] = ((n, split(line, delimiter)) for n, line in content_lines(text) if n > header)
+    rows: Iterable[Row] = [(n, split(line, delimiter)) for n, line in content_lines(text) if n > header]
+    for line, cells in rows:
+        if delimiter is None and len(cells) != len(names):
+            problem = f"must have as many cells as line {header} has names, {len(names)}"
+            raise InputError(f"{path}, line {line}", problem, " ".join(cells), "Names must have no blanks.")
+    if "time" in kinds:
+        of_last = [cells[kinds.index("time") :][:1] for _, cells in rows]
+        rows = [row for row, time in zip(rows, of_last, strict=True) if time == of_last[-1]]
     sizes = [_unit_of(names[column], f"{path}, line {header}") for column in columns.needed()[:4]]
     if SHEET_UNIT in names:
-        rows = list(rows)
         sizes = [_unit_of_rows(rows, names.index(SHEET_UNIT), path)] * 4
         if columns.body is None and SHEET_SHAPE in names:
             columns = replace(columns, body=names.index(SHEET_SHAPE))
-    description = f"table of spheres ({', '.join(names[column] for column in columns.needed())})"
+    last = ", the last time" if "time" in kinds else ""
+    description = f"table of spheres ({', '.join(names[column] for column in columns.needed())}){last}"
     read = spheres_of(description, rows, columns, path, delimiter)
     if not any(sizes):
         return read
@@ -122,11 +130,11 @@ def _unit_of(name: str, place: str) -> float | None:
     """Size of the unit in a column's name [m], or None."""
     match = _UNIT.search(name)
     unit = match[1].strip() if match else ""
-    if not unit:
-        return None
-    if unit not in UNITS["length"]:
-        raise InputError(place, f"must have a unit of length ({', '.join(UNITS['length'])})", name)
-    return UNITS["length"][unit]
+    try:
+        return unit_size(unit, "length") if unit else None
+    except ValueError:
+        problem = f"must have a unit of length ({', '.join(UNITS['length'])})"
+        raise InputError(place, problem, name) from None
 
 
 TABLE = Format("table with the columns x, y, z, radius", _looks_like_a_table, _read)

@@ -58,6 +58,7 @@ OTHERS = {
     "\x89HDF": ("an HDF5 file", "Export centres and radii as VTK or CSV."),
     "CDF": ("a NetCDF file", "Export centres and radii as VTK or CSV."),
     **dict.fromkeys(("BZh", "\x28\xb5\x2f\xfd", "\xfd7zXZ", "7z\xbc\xaf", "Rar!"), _PACKED),
+    **dict.fromkeys(("ply\n", "ply\r\n"), ("a PLY file", "Write its points as a table of x, y, z, radius.")),
     "%PDF": ("a PDF", "Save its picture as PNG or JPEG."),
     "PK\x03\x04": (
         "a ZIP archive or an Office document",
@@ -91,7 +92,7 @@ def head_of(path: Path) -> str:
         data = file.read(HEAD)
     head = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     # A format of text needs complete lines.
-    return head if len(data) < HEAD or "\0" in head else head.rpartition("\n")[0]
+    return head if len(data) < HEAD or "\0" in head else head.rpartition("\n")[0] or head
 
 
 def format_of(path: Path) -> Format | None:

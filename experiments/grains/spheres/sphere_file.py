@@ -154,6 +154,6 @@ def own_bodies(numbers: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def content_lines(text: str) -> list[tuple[int, str]]:
-    """Return lines that are not empty, without ``#`` comments, with their numbers."""
+    """Return lines that are not empty, without ``#`` comments and lines of ``%``, with their numbers."""
     lines = ((n, line.partition("#")[0].strip()) for n, line in enumerate(text.splitlines(), start=1))
-    return [(n, line) for n, line in lines if line]
+    return [(n, line) for n, line in lines if line and not line.startswith("%")]

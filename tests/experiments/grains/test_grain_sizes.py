@@ -164,6 +164,11 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
         ("opening,retained\n1,3\n", "mm", r"sizes.csv: needs 2 rows or more .*got 1"),
         ("opening\n1\n2\n", "mm", r"sizes.csv: needs one column of retained, .*got none"),
         (
+            "Maschenweite [µm];Rückstand [g]\n2.000;3\n1.000;4\n",
+            None,
+            r"sizes.csv:2: opening: may be a thousand times as large: write it without a point, got 2.000",
+        ),
+        (
             "opening,retained\n1-2,3\n2.5-3,4\n",
             "mm",
             r"sizes.csv:2: opening: must end at the opening that the next row begins with, got 1-2",
@@ -330,6 +335,12 @@ SHEETS = {
     "French masses": "Tamis (mm);Refus partiel (g)\n2;0\n1;30\n0,5;60\nFond;10\nSomme;100\n",
     "Spanish": "Abertura (mm);% que pasa\n2;100\n1;70\n0,5;10\n",
     "Spanish masses": "Tamiz, mm\tPeso retenido, g\n2\t0\n1\t30\n0,5\t60\nBandeja\t10\nTotal\t100\n",
+    "per cent in each cell": "opening,passing_percent\n2 mm,100 %\n1 mm,70 %\n0.5 mm,10%\n",
+    "Greek and other micrometres": "Particle size (μm),Retained %\n2000,0\n1000,30\n500 µm,60\n0,10\n",
+    "undersize": "Size class (mm),Cum. undersize (%)\n2,100\n1,70\n0.5,10\n",
+    "oversize": "Sieve (mm),Oversize (%)\n2,0\n1,30\n0.5,90\n",
+    "a sieve and what it holds": "Sieve size (mm),Sieve + retained (g),Retained (g)\n"
+    "2,400,0\n1,420,30\n0.5,440,60\nPan,310,10\n",
     "a column of numbers": "Mesh,Mass retained (g)\n#10,0\n18,30\n35,60\nPan,10\n",
     "a pan among the numbers": "Sieve No.,Opening (mm),Retained (g)\n10,2,0\n18,1,30\n35,0.5,60\n"
     "Pan,,10\nTotal,,100\n",

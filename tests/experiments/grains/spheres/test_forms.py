@@ -91,3 +91,37 @@ def test_another_format_is_named(content: bytes, name: str, tmp_path: Path) -> N
     assert code == 2
     assert name in " ".join(said.split())
     assert "OpenCV" not in said
+
+
+def _table(head: str, row: str, tail: str = "") -> str:
+    return f"{head}\n{''.join(row.format(*sphere) for sphere in SPHERES)}{tail}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        _table("id pos_x pos_y pos_z rad", "7 {} {} {} {}\n"),
+        _table(
+            '"Particle X-Coordinate (m)","Particle Y-Coordinate (m)","Particle Z-Coordinate (m)",'
+            '"Particle Radius (m)"',
+            "{},{},{},{}\n",
+        ),
+        _table("% a study\n% x y z r", "{} {} {} {}\n"),
+        "Time (s),x,y,z,r\n" + "".join(f"0,{x},{y},{z + 1},{r}\n" for x, y, z, r in SPHERES)
+        + "".join(f"0.5,{x},{y},{z},{r}\n" for x, y, z, r in SPHERES),
+        "x [µm];y [μm];z [um];r [µm]\n"
+        + "".join(";".join(f"{1e6 * value:.9g}" for value in sphere) + "\n" for sphere in SPHERES),
+    ],
+)  # fmt: skip
+def test_tables_of_other_programs_give_the_spheres_of_their_last_time(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "heap.txt"
+    path.write_text(text, encoding="utf-8")
+    read = read_spheres(path)
+    np.testing.assert_allclose(read.spheres * (read.unit or 1.0), SPHERES, rtol=1e-8)
+
+
+def test_a_name_with_a_blank_shifts_no_column(tmp_path: Path) -> None:
+    path = tmp_path / "heap.txt"
+    path.write_text(_table("Ball id x y z r wall mat", "7 {} {} {} {} 0.1 1\n"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"line 2: must have as many cells as line 1 has names, 8"):
+        read_spheres(path)
