@@ -332,7 +332,7 @@ SHEETS = {
     "<0,50;10\nSumme;100\n",
     "German, what passes": "Siebweite (mm);Summe Durchgang (%)\n2;100\n1;70\n0,5;10\n",
     "French": "Ouverture de maille (mm);Refus cumulé (%)\n2;0\n1;30\n0,5;90\nFond;100\n",
-    "French masses": "Tamis (mm);Refus partiel (g)\n2;0\n1;30\n0,5;60\nFond;10\nSomme;100\n",
+    "French masses": "Tamis (mm);Refus partiel (g)\n2;0\n1;30\n0,5;60\nFond;10\nTotal;100\n",
     "Spanish": "Abertura (mm);% que pasa\n2;100\n1;70\n0,5;10\n",
     "Spanish masses": "Tamiz, mm\tPeso retenido, g\n2\t0\n1\t30\n0,5\t60\nBandeja\t10\nTotal\t100\n",
     "per cent in each cell": "opening,passing_percent\n2 mm,100 %\n1 mm,70 %\n0.5 mm,10%\n",
