@@ -136,16 +136,8 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
     ("text", "unit", "message"),
     [
         ("opening,retained\n0.25 in,3\n0.5 in,4\n", None, r"sizes.csv:2: opening: needs a unit of length"),
-        (
-            "opening,retained\n0.25,3\n0.5,4\n",
-            None,
-            r"sizes.csv:2: opening: needs a unit .*; or write",
-        ),
-        (
-            "opening,retained\n1,3\n1,4\n",
-            "mm",
-            r"sizes.csv:3: opening: must be another opening.*got 1",
-        ),
+        ("opening,retained\n0.25,3\n0.5,4\n", None, r"sizes.csv:2: opening: needs a unit .*; or write"),
+        ("opening,retained\n1,3\n1,4\n", "mm", r"sizes.csv:3: opening: must be another opening.*got 1"),
         ("opening,retained\n-1,3\n1,4\n", "mm", r"sizes.csv:2: opening: must be positive, got -1"),
         (
             "opening,passing_percent\n1,30\n2,101\n",
@@ -153,11 +145,7 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
             r"sizes.csv:3: passing_percent: must be at most 100",
         ),
         ("opening,passing_percent\n1,60\n2,30\n", "mm", r"sizes.csv:3: passing_percent: must rise with the"),
-        (
-            "opening,retained_percent\n1,50\n2,40\n",
-            "mm",
-            r"must add up to 100 .*got 90",
-        ),
+        ("opening,retained_percent\n1,50\n2,40\n", "mm", r"must add up to 100 .*got 90"),
         ("opening,retained\n1,-3\n2,4\n", "mm", r"sizes.csv:2: retained: must be 0 or more, got -3"),
         ("opening,retained\n1,x\n2,4\n", "mm", r"sizes.csv:2: retained: must be a number"),
         ("opening,retained\n1,0\n2,4\n", "mm", r"sizes.csv: retained: must have mass between two sieves"),
