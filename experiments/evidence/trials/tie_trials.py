@@ -129,7 +129,7 @@ def compared(table: pd.DataFrame) -> pd.DataFrame:
         among = (table["chance"] >= low) & (table["chance"] < high)
         each, mean = own[among], 100 * table["chance"][among].mean()
         share = f"{100 * each.mean():.0f} ({100 * each.sem():.1f})"
-        words = f"forecast {100 * low:.0f} to {100 * high:.0f} %, {mean:.0f} on average: {len(each)}"
+        words = f"forecast from {100 * low:.0f} % on, {mean:.0f} on average: {len(each)}"
         rows += [{"condition": words, "the truth alone, % (se)": share}] if len(each) else []
     return pd.DataFrame(rows).fillna("")
 
