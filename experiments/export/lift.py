@@ -130,7 +130,9 @@ class Lift:
         drawn = np.random.default_rng([self.case.seed, FIRST_SEED]).integers(FIRST_SEED, 10**7, count)
         seeds: list[int] = []
         for number in drawn.tolist():
-            while not _is_prime(number) or number in seeds:
+            while number in seeds or not all(
+                number % divisor for divisor in range(2, math.isqrt(number) + 1)
+            ):
                 number += 1
             seeds.append(number)
         return tuple(seeds)
@@ -233,7 +235,3 @@ def stl_text(name: str, triangles: np.ndarray) -> str:
 
 def _numbers(values: np.ndarray) -> str:
     return " ".join(f"{value:.9g}" for value in values)
-
-
-def _is_prime(number: int) -> bool:
-    return number > 1 and all(number % divisor for divisor in range(2, math.isqrt(number) + 1))

@@ -130,14 +130,6 @@ class Formula:
         return (high - low) / (2.0 * STEP)
 
 
-def _tangent(angle: float) -> float:
-    return math.tan(math.radians(angle))
-
-
-def _rolling_run(slope: float, distance: float, run: float) -> float:
-    return rolling_run(math.radians(slope), distance, run)
-
-
 def _rebound_45(fall: float, height_1: float, distance_1: float, height_2: float, distance_2: float) -> float:
     # speeds over the root of the acceleration of gravity, which cancels: away from the plate, and downwards
     bent = height_1 * distance_2 - height_2 * distance_1
@@ -157,7 +149,7 @@ SWINGS = ("release", "striker", "struck")
 
 def _tilt(parameter: str, event: str) -> Formula:
     words = f"angle of the plate at which {event}; tan(angle)"
-    return Formula(parameter, {"angle": "angle"}, _tangent, words)
+    return Formula(parameter, {"angle": "angle"}, lambda angle: math.tan(math.radians(angle)), words)
 
 
 METHODS: Mapping[str, tuple[Formula, ...]] = {
@@ -168,7 +160,7 @@ METHODS: Mapping[str, tuple[Formula, ...]] = {
         Formula(
             "rolling_friction",
             {"slope": "angle", "distance": "length", "run": "length"},
-            _rolling_run,
+            lambda slope, distance, run: rolling_run(math.radians(slope), distance, run),
             "angle of a slope, distance rolled down it, run on the flat behind it; "
             "distance sin(slope) / (distance cos(slope) + run)",
         ),

@@ -18,16 +18,13 @@ from experiments.io.toml_files import toml_text
 from experiments.report.clump_files import gather_clumps
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Direct, Response
-from experiments.studyfile.card import MATERIAL, SECTIONS
+from experiments.studyfile.card import FORMAT, MATERIAL, SECTIONS
 from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
 from experiments.studyfile.manifest import PLUG_INS
 from experiments.studyfile.solver_section import CORRECTED_FOR, LAWS, written
 
 CARD = "material.toml"
-
-FORMAT = 1
-"""Version of the card."""
 
 MOST_POINTS = 60
 """Compatible settings that a card lists."""

@@ -24,6 +24,9 @@ MATERIAL = "material"
 BRIDGE = "bridge"
 """Table of a card whose values a bridge has corrected."""
 
+FORMAT = 1
+"""Version of the keys of a card."""
+
 SECTIONS = ("grain", "wall", "contact", "mechanism", "solver")
 """Sections of a study that describe a material, and the laws and the solver that its values hold for."""
 
@@ -73,6 +76,9 @@ def read_card(path: Path) -> dict[str, Any]:
     if not isinstance(sections, dict) or not set(sections) <= set(SECTIONS):
         tables = ", ".join(f"[{MATERIAL}.{name}]" for name in SECTIONS)
         raise StudyError(str(path), f"is not a material card, which has the tables {tables}", sorted(card))
+    if (written := card.get("format", FORMAT)) != FORMAT:
+        problem = f"must be {FORMAT}: another version of dem-warp wrote the card"
+        raise StudyError(f"{path}: format", problem, written, "Use that version, or run calibrate again.")
     for table, key in files_of(sections):
         table[key] = str(path.parent.resolve() / table[key])
     bridge = card.get(BRIDGE)

@@ -26,6 +26,10 @@ Corners = NDArray[np.float64]
 Faces = NDArray[np.intp]
 
 
+FLAT = 1e-3
+"""Least thickness of a body, as a part of its length."""
+
+
 def read_surface(path: Path, unit: float) -> Trimesh:
     """Read a closed surface [m] from a mesh file; `unit` is its unit [m].
 
@@ -43,6 +47,9 @@ def read_surface(path: Path, unit: float) -> Trimesh:
         if faces is None:
             raise
         mesh = _closed(path, *_cleaned(corners, faces), unit)
+    if mesh.extents.min() < FLAT * mesh.extents.max():
+        problem = f"is too flat to be filled with spheres: {1e3 * mesh.extents.min():.3g} mm"
+        raise InputError(str(path), problem, hint="Give it its thickness in a mesh program.")
     if mesh.body_count == 1 and _crosses_itself(mesh):
         problem = "the surface crosses itself"
         hint = "Unite its parts in a mesh program (in Blender: Remesh; in MeshLab: Mesh Boolean)."

@@ -69,6 +69,8 @@ def test_a_surface_that_crosses_itself_is_refused_and_thin_and_hollow_ones_are_n
     for pushed in (top, one):
         with pytest.raises(InputError, match="crosses itself"):
             read_surface(obj(tmp_path / "crossing.obj", CORNERS - [0.0, 0.0, 6.0] * pushed, FACES), unit)
+    with pytest.raises(InputError, match="too flat to be filled with spheres"):
+        read_surface(obj(tmp_path / "flat.obj", CORNERS * [1.0, 1.0, 1e-4], FACES), unit)
     dented = CORNERS * [1.0, 1.0, 1.0] - [0.0, 0.0, 3.0] * (CORNERS[:, 2:] > 1.8)
     for name, corners in (("dented.obj", dented), ("thin.obj", CORNERS * [1.0, 1.0, 0.02])):
         assert read_surface(obj(tmp_path / name, corners, FACES), unit).volume > 0.0

@@ -13,7 +13,7 @@ from experiments.calibrate import Campaign
 from experiments.io.errors import StudyError
 from experiments.report.clump_files import gather_clumps
 from experiments.report.material_card import CARD, material_card, write_material_card
-from experiments.studyfile import Study, load_study
+from experiments.studyfile import Study, load_card, load_study
 
 TEST = """
 name = "Another test of the same material"
@@ -118,6 +118,12 @@ def test_what_is_no_card_is_refused(tmp_path: Path, content: str | None, rule: s
     (tmp_path / "test.toml").write_text(TEST.replace("material.toml", "card.toml"), encoding="utf-8")
     with pytest.raises(StudyError, match=rule):
         load_study(tmp_path / "test.toml")
+
+
+def test_a_card_of_another_version_is_refused(card: Path) -> None:
+    card.write_text(card.read_text(encoding="utf-8").replace("format = 1", "format = 2"), encoding="utf-8")
+    with pytest.raises(StudyError, match=r"format: must be 1: another version .* wrote the card, got 2"):
+        load_card(card)
 
 
 def test_a_card_in_the_place_of_a_study_is_called_a_card(card: Path) -> None:
