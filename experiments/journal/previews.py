@@ -52,7 +52,10 @@ class Previews:
             return
         begun = time.perf_counter()
         self._take(batch)
-        self._wait(time.perf_counter() - begun)
+        cost = time.perf_counter() - begun
+        self.spent += cost
+        # the cost of a preview is a small part of the time
+        self._due = time.monotonic() + max(EVERY, cost / SHARE)
 
     def _take(self, batch: Batch) -> None:
         worlds = batch.running[:: max(1, -(-len(batch.running) // WORLDS))]
@@ -77,11 +80,6 @@ class Previews:
                 temporary.replace(self.folder / f"{name}.npz")
             finally:
                 temporary.unlink(missing_ok=True)
-
-    def _wait(self, cost: float) -> None:
-        """Wait until the cost of a preview is a small part of the time."""
-        self.spent += cost
-        self._due = time.monotonic() + max(EVERY, cost / SHARE)
 
 
 def spheres_of(result: CaseResult) -> np.ndarray:

@@ -136,9 +136,11 @@ def _measured(
     settled = MeasurementSection()
     bodies = len(heap.radii) if file.bodies is None else len(np.unique(file.bodies[standing]))
     angle = heap_angle(heap.centers, heap.radii, settled.azimuths, fit, settled.pixels, grain_count=bodies)
+    low, high = 1e3 * heap.radii.min(), 1e3 * heap.radii.max()
+    span = f"{low:.3g} mm" if high - low < 1e-3 * high else f"{low:.3g} to {high:.3g} mm"
     parts = [
         file.description,
-        f"{len(heap.radii)} spheres of {_span(heap.radii)} radius"
+        f"{len(heap.radii)} spheres of {span} radius"
         + ("" if file.bodies is None else f" in {bodies} grains"),
         f"plate {'found' if settings.plate_height is None else 'given'} at {1e3 * height:.4g} mm",
     ]
@@ -156,11 +158,6 @@ def _doubted_plate(spheres: Spheres, height: float) -> Iterator[Doubt]:
         found = find_ground(spheres)
         if abs(found - height) > BELOW * np.median(spheres.radii):
             yield Doubt("plate", f"given at {1e3 * height:.4g} mm; most spheres rest at {1e3 * found:.4g} mm")
-
-
-def _span(radii: np.ndarray) -> str:
-    low, high = 1e3 * radii.min(), 1e3 * radii.max()
-    return f"{low:.3g} mm" if high - low < 1e-3 * high else f"{low:.3g} to {high:.3g} mm"
 
 
 def values_of(heap: MeasuredHeap, level: float) -> dict[str, Any]:

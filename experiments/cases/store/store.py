@@ -89,7 +89,8 @@ class Store:
                 str(path), "this stored case was removed", hint="Add --resume to simulate it again."
             )
         try:
-            values = _read_values(path)
+            values: dict[str, Any] = read_arrays(path)
+            values |= json.loads(values.pop(_RECORD).tobytes())
             found = (values.pop("key"), values.pop("format"))
             if found != (key, FORMAT):
                 raise ValueError(f"it holds the case {found[0]} in format {found[1]}")
@@ -98,11 +99,6 @@ class Store:
             return result
         except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
             raise StoreError(str(path), f"this stored case is damaged: {error}") from error
-
-
-def _read_values(path: Path) -> dict[str, Any]:
-    values: dict[str, Any] = read_arrays(path)
-    return values | json.loads(values.pop(_RECORD).tobytes())
 
 
 def _check(result: CaseResult) -> None:
