@@ -60,7 +60,7 @@ def propose(first: Fitted, rivals: Sequence[Rival], replicates: int, power: floa
     """Choose what to repeat: the fewest measurements that tell a model from its rivals with a power.
 
     One condition is repeated, or every condition, as often as it was measured, or two, four or eight times as
-    often; the last where nothing is enough. Further heaps join those of their condition: they have the same
+    often; the last where nothing is enough. Further ones join those of their condition: they have the same
     errors of instruments and emulator.
     """
     names = first.model.emulator.space.conditions
