@@ -184,8 +184,8 @@ def withdrawn(conclusion: Conclusion, compared: Sequence[BeforeAfter]) -> Conclu
     """Withdraw a name or a tie whose fresh runs predict held-out conditions worse than the base's do.
 
     The noise of the measured means is in both Qs, that of the fresh runs in one each. Of two models that are
-    equally good the scores of a mean, of as many replicates as runs, correlate by 1/2: their squares differ with a
-    variance of 2 + 2 - 4 (1/2)^2 = 3.
+    equally good the scores of a mean, of as many replicates as runs, correlate by 1/2: their squares differ
+    with a variance of 2 + 2 - 4 (1/2)^2 = 3.
     """
     for one in compared:
         limit = WORSE * math.sqrt(3.0 * one.degrees_of_freedom)
