@@ -210,7 +210,8 @@ class Surface:
     def adequate_precision(self) -> float:
         """Range of the fitted responses over their mean standard error (Box and Draper); should exceed 4."""
         mean_variance = len(self.fit.params) * self.residual_ms / len(self.response)
-        return float((self.fitted.max() - self.fitted.min()) / np.sqrt(mean_variance))
+        with np.errstate(divide="ignore", invalid="ignore"):  # an exact fit has no error
+            return float((self.fitted.max() - self.fitted.min()) / np.sqrt(mean_variance))
 
     def drop(self, *names: str) -> "Surface":
         """Return the refit without these terms; raise DesignError for a part of a term that stays.

@@ -15,7 +15,10 @@ from experiments.io.errors import InputError
 from experiments.io.rows import Row, read_rows
 from experiments.io.texts import is_number, nearest_name, number
 
-RUN = ("run", "std", "stdorder", "std order", "standard order")
+RUN = (
+    "run", "std", "stdorder", "std order", "standard order", "run no", "run no.", "no", "no.", "nr", "nr.",
+    "id", "trial", "test", "experiment", "versuch", "lauf", "essai", "ensayo", "corrida",
+)  # fmt: skip
 """Heads of the column with the runs' labels, in small letters."""
 ORDER = ("order", "runorder", "run order", "pttype", "pattern", "space type")
 """Heads of columns that other programs write and no analysis needs."""

@@ -214,6 +214,16 @@ def test_columns_of_other_programs_are_not_factors() -> None:
     )
 
 
+@pytest.mark.parametrize("twist", [0.5, 0.0])  # without one the fit is exact, and no warning leaks
+@pytest.mark.parametrize("head", ["Versuch", "Nr.", "Run No", "ID", "Essai"])
+def test_a_number_of_the_run_is_not_a_factor(head: str, twist: float) -> None:
+    corners = [(-1, -1), (1, -1), (-1, 1), (1, 1)]
+    rows = [f"{i};{a};{b};{20 + a + 2 * b + twist * a * b}" for i, (a, b) in enumerate(corners)]
+    Path("runs.csv").write_text("\n".join([f"{head};A;B;angle", *rows]) + "\n", encoding="utf-8")
+    tables = answered("fit", "runs.csv", "--model", "first-order")
+    assert tables["coefficients"]["estimate"].to_list() == pytest.approx([20.0, 1.0, 2.0])
+
+
 def test_a_title_above_the_names_changes_nothing() -> None:
     text = "A (mm),B,angle\n1,0,11\n2,0,12\n1,1,13\n2,1,14.2\n"
     Path("runs.csv").write_text(text, encoding="utf-8")
