@@ -98,7 +98,11 @@ class Resources:
         if self.scheduler is not None:
             return asked or 1
         if self.submits_jobs and self.cluster is not None:
-            return self._in_whole_jobs(asked or self.cluster.workers_per_job, self.cluster.workers_per_job)
+            each = self.cluster.workers_per_job
+            # Dask would end the surplus with all of its job, and submit that job again, for ever
+            if (asked or each) % each:
+                raise InputError(self._place_of_workers, f"must fill whole jobs of {each} workers", asked)
+            return asked or each
         if self.gpus:
             return len(self.gpus) * self.sharing
         here = cores()
@@ -117,12 +121,6 @@ class Resources:
             return (each + PROCESS_BYTES) * min(self.count, most) + PROCESS_BYTES
         rounds = rounds_of(most, most * work_of(largest).grains, self.count, sharing=self.sharing)
         return each * self.sharing * -(-most // (self.count * rounds))
-
-    def _in_whole_jobs(self, asked: int, each: int) -> int:
-        # Dask would end the surplus with all of its job, and submit that job again, for ever
-        if asked % each:
-            raise InputError(self._place_of_workers, f"must fill whole jobs of {each} workers", asked)
-        return asked
 
     @property
     def _place_of_workers(self) -> str:
