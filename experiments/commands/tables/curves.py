@@ -64,14 +64,14 @@ def fit_curve(
     band = fit.forecast("", 0.0, 1.0 - alpha, seed)._asdict()
     curve = pd.DataFrame({"measured": pd.Series(seen, places[own]).reindex(places), **band}, places)
     answer = Answer("Settings of a curve", [settings.to_string(float_format="{:.4g}".format)])
-    answer.tables["settings"] = f"Settings that agree, with {1.0 - alpha:.0%} of the probability.", settings
-    answer.tables["curve"] = "Measured, and expected of a further measurement.", curve.rename_axis("place")
+    answer.tables["settings"] = f"Settings that agree ({1.0 - alpha:.0%} of the posterior probability).", settings
+    answer.tables["curve"] = f"Measured, and {1.0 - alpha:.0%} band of a further measurement.", curve.rename_axis("place")
     rest = float(np.sqrt(np.mean(fit.residuals(fit.best[None]) ** 2)))
     answer.notes = [
         f"The best settings differ from the measured curve by {rest:.3g} (root mean square).",
-        f"What the model misses is some {fit.miss.sd:.2g}, alike over {fit.miss.length:.2g} of the places.",
+        f"The model misses some {fit.miss.sd:.2g}, alike at places up to {fit.miss.length:.2g} apart.",
     ]
-    answer.draw("curve", "Measured curve, and what is expected.", partial(_drawn, curve))
+    answer.draw("curve", f"Measured curve, and {1.0 - alpha:.0%} band of a further measurement.", partial(_drawn, curve))
     return answer
 
 
