@@ -63,15 +63,16 @@ def fit_curve(
     settings["part of the range"] = (ends[1] - ends[0]) / 2.0
     band = fit.forecast("", 0.0, 1.0 - alpha, seed)._asdict()
     curve = pd.DataFrame({"measured": pd.Series(seen, places[own]).reindex(places), **band}, places)
+    sure = f"{1.0 - alpha:.0%}"
     answer = Answer("Settings of a curve", [settings.to_string(float_format="{:.4g}".format)])
-    answer.tables["settings"] = f"Settings that agree ({1.0 - alpha:.0%} of the posterior probability).", settings
-    answer.tables["curve"] = f"Measured, and {1.0 - alpha:.0%} band of a further measurement.", curve.rename_axis("place")
+    answer.tables["settings"] = f"Settings that agree ({sure} of the probability).", settings
+    answer.tables["curve"] = f"Measured, and {sure} band of a further one.", curve.rename_axis("place")
     rest = float(np.sqrt(np.mean(fit.residuals(fit.best[None]) ** 2)))
     answer.notes = [
         f"The best settings differ from the measured curve by {rest:.3g} (root mean square).",
         f"The model misses some {fit.miss.sd:.2g}, alike at places up to {fit.miss.length:.2g} apart.",
     ]
-    answer.draw("curve", f"Measured curve, and {1.0 - alpha:.0%} band of a further measurement.", partial(_drawn, curve))
+    answer.draw("curve", f"Measured curve, and {sure} band of a further one.", partial(_drawn, curve))
     return answer
 
 
