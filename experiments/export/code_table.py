@@ -10,7 +10,7 @@ from importlib.resources import files
 from operator import attrgetter
 from typing import Any
 
-from dem_warp import Material
+from dem_warp import LiftedCylinder, Material
 from experiments.export.contact import Contact, Term, contacts_of, values
 from experiments.export.exporter import ExportedTest, Exporter, Translation
 from experiments.export.laws import LawsOfCode, Translated, mechanism_warnings
@@ -22,13 +22,13 @@ Numbers = Callable[[Contact], Mapping[str, float]]
 
 @dataclass(frozen=True)
 class CodeTest:
-    """A lifted cylinder with the contacts that a code can have."""
+    """A test with the contacts that a code can have."""
 
     lift: Lift
     exporter: Exporter
     """Exporter of the code."""
     contacts: tuple[Contact, Contact, Contact]
-    """Contacts of grains with grains, the tube and the plate under the code's laws."""
+    """Contacts of grains with grains, the tube (bin) and the plate (floor) under the code's laws."""
     words: Mapping[str, str]
     """Words of the code for each law."""
     rows: tuple[Translated, ...]
@@ -51,9 +51,12 @@ class CodeTest:
 
 
 def code_exporter(
-    name: str, translate: Callable[[CodeTest], Translation], numbers: Numbers = lambda contact: {}
+    name: str,
+    translate: Callable[[CodeTest], Translation],
+    numbers: Numbers = lambda contact: {},
+    kinds: tuple[type, ...] = (LiftedCylinder,),
 ) -> Exporter:
-    """Make the exporter of the code with a table; `translate` writes the input of its tests."""
+    """Make the exporter of the code with a table; `translate` writes the input of tests of these kinds."""
     table = code_table(name)
     code, source = table["code"], table["source"]
     laws = code_laws(name)
@@ -65,7 +68,7 @@ def code_exporter(
         return tuple(_terms(table["contact"], contact, numbers(contact), source))
 
     def translated(test: ExportedTest) -> Translation:
-        return translate(_code_test(exporter, laws, test, table.get("notes", ())))
+        return translate(_code_test(exporter, laws, Lift(test, code, kinds), table.get("notes", ())))
 
     exporter = Exporter(
         code,
@@ -106,16 +109,16 @@ def _terms(
 
 
 def _code_test(
-    exporter: Exporter, laws: LawsOfCode, test: ExportedTest, notes: Sequence[Mapping[str, str]]
+    exporter: Exporter, laws: LawsOfCode, lift: Lift, notes: Sequence[Mapping[str, str]]
 ) -> CodeTest:
-    lift, own = Lift(test), test.case.laws
+    own = lift.case.laws
     case = replace(lift.case, mechanisms=(), laws=laws.nearest_laws(own))
     heaviest = max(template.mass for template in lift.templates)
     among, tube = contacts_of(case, lift.largest_radius, heaviest)
-    coefficients = lift.scene.contacts(case)[2]
+    coefficients = lift.scene.contacts(case)[-1]
     surface = replace(tube.surface, static_friction=coefficients.static_friction)
     plate = replace(tube, surface=surface, coefficients=coefficients)
-    warnings = laws.warnings(own) + mechanism_warnings(test.case, exporter.code)
+    warnings = laws.warnings(own) + mechanism_warnings(lift.case, exporter.code)
     return CodeTest(
         lift,
         exporter,

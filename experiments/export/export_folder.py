@@ -112,7 +112,9 @@ def _grain_rows(case: Case[Any]) -> tuple[tuple[str, ...], list[tuple[object, ..
 
 def _running(test: ExportedTest, translation: Translation) -> str:
     text = f"## Run\n\n    {' '.join(translation.command)}\n"
-    if translation.heap:
+    if translation.heap and not test.case.scene.leaves_a_heap:
+        text += f"\nIt leaves `{translation.heap}`, and nothing there before it has finished.\n"
+    elif translation.heap:
         text += (
             f"\nIt leaves the spheres of the final heap in `{translation.heap}` (LAMMPS dump, metres), and "
             f"nothing there before it has finished. Its angle, read as the study's ({test.estimator}):\n\n"

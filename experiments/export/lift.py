@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from dem_warp import Case, ClumpShape, LiftedCylinder
+from dem_warp import Case, ClumpShape, Hopper, LiftedCylinder
 from dem_warp.scenes.lifted_cylinder import LiftController
 from dem_warp.scenes.phases import CALM
 from experiments.export.exporter import ExportedTest
@@ -66,7 +67,7 @@ class Template:
 
 @dataclass(frozen=True)
 class Lift:
-    """Lifted cylinder and the numbers that follow from its case.
+    """Lifted cylinder, or a hopper, and the numbers that follow from its case.
 
     Raises
     ------
@@ -75,23 +76,32 @@ class Lift:
     """
 
     test: ExportedTest
+    code: str = "this code"
+    """Name of the code that it is exported to."""
+    kinds: tuple[type, ...] = (LiftedCylinder,)
+    """Kinds of tests that the code is given."""
 
     def __post_init__(self) -> None:
         scene = self.test.case.scene
-        if not isinstance(scene, LiftedCylinder):
-            rule = "the test must be a lifted-cylinder: no other is exported"
-            raise InputError(self.test.source, rule, getattr(scene, "name", type(scene).__name__))
-        if scene.lip > 0.0:
+        if not isinstance(scene, self.kinds):
+            rule = f"the test must be a {' or a '.join(kind.name for kind in self.kinds)}: {self.code} "  # type: ignore[attr-defined]
+            raise InputError(
+                self.test.source, rule + "is given no other", getattr(scene, "name", type(scene).__name__)
+            )
+        if isinstance(scene, Hopper) and not self.is_of_spheres:
+            rule = f"the grains must be single spheres: {self.code} is given no hopper of clumps"
+            raise InputError(self.test.source, rule, f"{len(self.templates[0].radii)} spheres")
+        if isinstance(scene, LiftedCylinder) and scene.lip > 0.0:
             rule = "the plate must have no lip: no code is given one"
             raise InputError(self.test.source, rule, f"lip = {scene.lip:g} m")
 
     @property
-    def case(self) -> Case[LiftedCylinder]:
+    def case(self) -> Case[Any]:
         """The case."""
         return self.test.case
 
     @property
-    def scene(self) -> LiftedCylinder:
+    def scene(self) -> Any:
         """Its scene."""
         return self.case.scene
 
@@ -154,7 +164,7 @@ class Lift:
     @property
     def rain_bottom(self) -> float:
         """Lowest height that a grain is put at [m]."""
-        return self.scene.height + self.reach + self.skin
+        return self.scene.brim + self.reach + self.skin
 
     @property
     def rain_height(self) -> float:
@@ -191,7 +201,7 @@ class Lift:
     @property
     def strike(self) -> float:
         """Height above which spheres are struck off with their grains [m], in the mean as many as grains."""
-        return self.scene.height + self.rise_of_spheres
+        return self.scene.brim + self.rise_of_spheres
 
     @cached_property
     def rise_of_spheres(self) -> float:
@@ -204,10 +214,15 @@ class Lift:
 
 def prism(radius: float, height: float, sides: int = SIDES) -> np.ndarray:
     """Return the triangles of a prism around a tube on z = 0, touching it [m], (2 sides, 3, 3)."""
-    turns = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     corner = radius / np.cos(np.pi / sides)
-    low = np.column_stack([corner * np.cos(turns), corner * np.sin(turns), np.zeros(sides)])
-    high = low + np.array([0.0, 0.0, height])
+    return shell(corner, corner, height, sides)
+
+
+def shell(low_corner: float, high_corner: float, height: float, sides: int = SIDES) -> np.ndarray:
+    """Return the triangles between two polygons, at z = 0 and above, by the radii of their corners [m]."""
+    turns = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    circle = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(sides)])
+    low, high = low_corner * circle, high_corner * circle + np.array([0.0, 0.0, height])
     next_low, next_high = np.roll(low, -1, axis=0), np.roll(high, -1, axis=0)
     halves = [(low, next_low, next_high), (low, next_high, high)]
     return np.concatenate([np.stack(corners, axis=1) for corners in halves])
@@ -216,9 +231,14 @@ def prism(radius: float, height: float, sides: int = SIDES) -> np.ndarray:
 def disc(radius: float, sides: int = SIDES) -> np.ndarray:
     """Return the triangles of a regular polygon at z = 0 with the area of a disc [m], (sides, 3, 3)."""
     turns = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
-    corner = radius * math.sqrt(2.0 * np.pi / (sides * math.sin(2.0 * np.pi / sides)))
+    corner = disc_corner(radius, sides)
     rim = np.column_stack([corner * np.cos(turns), corner * np.sin(turns), np.zeros(sides)])
     return np.stack([np.zeros_like(rim), rim, np.roll(rim, -1, axis=0)], axis=1)
+
+
+def disc_corner(radius: float, sides: int = SIDES) -> float:
+    """Return the radius of the corners of a regular polygon with the area of a disc [m]."""
+    return radius * math.sqrt(2.0 * np.pi / (sides * math.sin(2.0 * np.pi / sides)))
 
 
 def stl_text(name: str, triangles: np.ndarray) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dem_warp import LiftedCylinder
 from experiments.export.laws import Translated
 from experiments.export.lift import SIDES, Lift
 from experiments.export.sizes import sizes_text
@@ -9,6 +10,19 @@ from experiments.export.sizes import sizes_text
 
 def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
     """Return the translation of the parts of the test that all codes share; the tube is a prism or exact."""
+    scene = lift.scene
+    prism = f"prism of {SIDES} sides that touch it from outside"
+    return (
+        *filling_rows(lift),
+        Translated("tube", "cylinder", "the same" if exact_tube else prism),
+        Translated("plate", _plate(lift), _plate(lift)),
+        Translated("lift", f"{scene.lift_speed:g} m/s", f"{scene.lift_speed:g} m/s, until clear of the heap"),
+        *end_rows(lift),
+    )
+
+
+def filling_rows(lift: Lift) -> tuple[Translated, ...]:
+    """Return the translation of the grains and of the filling."""
     case, scene = lift.case, lift.scene
     scale = case.numerics.modulus_scale
     shear, softened = case.grains.material.shear_modulus, case.grain_material.shear_modulus
@@ -17,15 +31,18 @@ def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
     rate = f"{lift.rain_rate:.4g} grains a second, {scene.rain_speed:g} m/s"
     slower = "" if lift.rain_rate == lift.given_rate else _slower(lift)
-    prism = f"prism of {SIDES} sides that touch it from outside"
     return (
         Translated("shear modulus of the grains", f"{shear:.6g} Pa", f"{softening}; calibrated so, keep it"),
         Translated("sizes", sizes, f"{len(lift.templates)} templates: mean, variance and mean mass the same"),
         Translated("mass and inertia", "of the union of the spheres", "the same, given with each template"),
         Translated("filling", f"{filled}; {lift.given_rate:g} grains a second", f"{filled}; {rate}{slower}"),
-        Translated("tube", "cylinder", "the same" if exact_tube else prism),
-        Translated("plate", _plate(lift), _plate(lift)),
-        Translated("lift", f"{scene.lift_speed:g} m/s", f"{scene.lift_speed:g} m/s, until clear of the heap"),
+    )
+
+
+def end_rows(lift: Lift) -> tuple[Translated, ...]:
+    """Return the translation of the end, the numerics and the seed."""
+    case, scene = lift.case, lift.scene
+    return (
         Translated(
             "end",
             f"at rest: rms speed below {scene.rest_speed:g} m/s, none above {lift.calm_speed:g} m/s, for "
@@ -52,10 +69,13 @@ def lift_warnings(lift: Lift, ends_in_time: bool = False) -> tuple[str, ...]:
     scene = lift.scene
     left_out = {
         f"air_drag = {scene.air_drag:g} /s": scene.air_drag > 0.0,
-        f"vibration_amplitude = {scene.vibration_amplitude:g} m": scene.vibration_amplitude > 0.0,
-        f"duration = {scene.duration} s, in place of it the test ends at rest": scene.duration is not None
-        and not ends_in_time,
     }
+    if isinstance(scene, LiftedCylinder):
+        left_out |= {
+            f"vibration_amplitude = {scene.vibration_amplitude:g} m": scene.vibration_amplitude > 0.0,
+            f"duration = {scene.duration} s, in place of it the test ends at rest": scene.duration is not None
+            and not ends_in_time,
+        }
     return tuple(f"scene {name}: left out" for name, present in left_out.items() if present)
 
 

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from dem_warp import Hopper, LiftedCylinder
 from experiments.export import liggghts_text as text
 from experiments.export.code_table import CodeTest, code_exporter, code_laws
 from experiments.export.exporter import Translation
 from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift, disc, prism, stl_text
 from experiments.export.lift_rows import lift_rows, lift_warnings
+from experiments.export.liggghts_hopper import (
+    DISCHARGE_FILE,
+    WEIGHED,
+    bin_top,
+    hopper_meshes,
+    hopper_opening,
+    hopper_room,
+    hopper_rows,
+    hopper_walls,
+)
 from experiments.export.script_text import HEAP_FILE, Rain, clear_loop, fill_loop, rest_loop, watched
 
 INPUT, TUBE_FILE, PLATE_FILE = "lift.in", "tube.stl", "plate.stl"
@@ -37,24 +50,46 @@ undump heap
 
 
 def translate(test: CodeTest) -> Translation:
-    """Write the input of a lifted cylinder and its meshes."""
+    """Write the input of a lifted cylinder or a hopper and its meshes."""
+    if isinstance(test.lift.scene, Hopper):
+        return _hopper(test)
     lift, scene = test.lift, test.lift.scene
     files = {TUBE_FILE: stl_text("tube", prism(scene.diameter / 2, scene.height))}
     if scene.plate_diameter is not None:
         files[PLATE_FILE] = stl_text("plate", disc(scene.plate_diameter / 2))
     model = text.model_words(test.words)
-    files[INPUT] = "".join([_setup(test, model), *_filling(lift), *_lifting(lift)])
+    half_width, _, bottom = scene.room(lift.reach)
+    types, room = ("grains", "tube", "plate"), (half_width, bottom)
+    setup = _setup(test, model, types, room, 2.0 * scene.height, _walls(lift, model))
+    files[INPUT] = "".join([setup, watched(lift), *_filling(lift), *_lifting(lift)])
     bodies = "`fix nve/sphere`" if lift.is_of_spheres else "`fix multisphere`, mass and inertia given"
     rows = (*test.rows, *lift_rows(lift), Translated("grains", "clumps, rigid", bodies))
     warnings = test.warnings + lift_warnings(lift)
     return Translation(files, INPUT, ("liggghts", "-in", INPUT), HEAP_FILE, rows, warnings)
 
 
-def _setup(test: CodeTest, model: str) -> str:
+def _hopper(test: CodeTest) -> Translation:
+    lift, model, input = test.lift, text.model_words(test.words), "hopper.in"
+    walls = hopper_walls(lift, model)
+    setup = _setup(test, model, ("grains", "bin", "floor"), hopper_room(lift), bin_top(lift), walls)
+    parts = [setup, watched(lift, more=WEIGHED), *_filling(lift), hopper_opening(lift, _QUIT)]
+    files = {input: "".join(parts)} | hopper_meshes(lift)
+    rows, warnings = (*test.rows, *hopper_rows(lift)), test.warnings + lift_warnings(lift)
+    return Translation(files, input, ("liggghts", "-in", input), DISCHARGE_FILE, rows, warnings)
+
+
+def _setup(
+    test: CodeTest,
+    model: str,
+    types: Sequence[str],
+    room: tuple[float, float],
+    highest: float,
+    walls: str,
+) -> str:
     lift, scene = test.lift, test.lift.scene
-    half_width, _, bottom = scene.room(lift.reach)
+    half_width, bottom = room
     rain_top = lift.rain_bottom + lift.rain_height
-    top = max(rain_top, 2.0 * scene.height) + 2.0 * lift.reach
+    top = max(rain_top, highest) + 2.0 * lift.reach
     among, tube, plate = test.contact_values
 
     def contact(i: int, j: int) -> text.Numbers:
@@ -73,7 +108,7 @@ def _setup(test: CodeTest, model: str) -> str:
     kinds = [(template, template.fraction, 1) for template in lift.templates]
     parts = [
         text.head(
-            ("grains", "tube", "plate"),
+            types,
             (-half_width, half_width, -half_width, half_width, bottom, top),
             lift.skin,
             2.0 * lift.largest_radius + lift.skin,
@@ -81,10 +116,9 @@ def _setup(test: CodeTest, model: str) -> str:
         "\n# contacts\n",
         text.contacts(text.properties(test.material_values, contact), model, lift.case.time_step),
         text.weight(scene.gravity),
-        f"\n# walls\n{_walls(lift, model)}\n",
+        f"\n# walls\n{walls}\n",
         f"# filling: {rain.rate:.6g} grains a second, {rain.count} of them\n",
         text.pouring(kinds, rain, lift.seeds(2 + len(kinds))),
-        watched(lift),
     ]
     return "".join(parts)
 
@@ -125,7 +159,7 @@ def _lifting(lift: Lift) -> list[str]:
     return [lifting, rest_loop(lift, "rest", _QUIT), _END]
 
 
-LIGGGHTS = code_exporter("liggghts", translate)
+LIGGGHTS = code_exporter("liggghts", translate, kinds=(LiftedCylinder, Hopper))
 
 CONVENTIONS = code_laws("liggghts")
 """Contact laws that it has."""

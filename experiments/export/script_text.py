@@ -27,7 +27,7 @@ compute heaped all reduce sum v_above
 compute highest all reduce max z
 variable heaped equal c_heaped
 variable moving equal "sqrt(c_square) > {rest:.6g} || c_fastest > {calm:.6g}"
-thermo_style custom step atoms cpu c_fastest c_square c_heaped c_highest
+thermo_style custom step atoms cpu c_fastest c_square c_heaped c_highest{more}
 thermo {look}
 thermo_modify lost ignore norm no
 """
@@ -97,12 +97,14 @@ def plain(numbers: Iterable[float], digits: int = 9) -> str:
     return " ".join(f"{number:.{digits}g}" for number in numbers)
 
 
-def watched(lift: Lift, look: int | None = None) -> str:
+def watched(lift: Lift, look: int | None = None, more: str = "") -> str:
     """Write the monitored quantities: speeds, the highest sphere, and the slow ones above the rim.
 
-    `look` is the number of steps between two looks; default: that of `LOOK`.
+    `look` is the number of steps between two looks; default: that of `LOOK`; `more`
+    are further words of the log.
     """
     return _WATCHED.format(
+        more=more,
         look=look or lift.steps(LOOK),
         strike=lift.strike,
         slow=0.5 * lift.scene.rain_speed,
@@ -130,13 +132,14 @@ def clear_loop(look: int, looks: int, clearance: float, rise: str = "") -> str:
     return _CLEAR.format(look=look, looks=looks, clearance=clearance, rise=rise)
 
 
-def rest_loop(lift: Lift, name: str, quit: str, look: int | None = None) -> str:
+def rest_loop(lift: Lift, name: str, quit: str, look: int | None = None, limit: float | None = None) -> str:
     """Write the loop until rest after the filling, ``settle``, or after the lift, ``rest``.
 
-    At its time limit the program ends by the command `quit`; `look` as in `watched`.
+    At its time limit [s] the program ends by the command `quit`; `look` as in `watched`.
     """
     look_time = LOOK if look is None else look * lift.case.time_step
-    limit = LiftController.SETTLE_LIMIT if name == "settle" else LiftController.LIFT_MARGIN
+    own = LiftController.SETTLE_LIMIT if name == "settle" else LiftController.LIFT_MARGIN
+    limit = limit or own
     return _REST.format(
         name=name,
         look=look or lift.steps(LOOK),

@@ -14,7 +14,9 @@ import experiments.export
 from dem_warp import Case, CaseResult
 from dem_warp.provenance import source_meaning
 from experiments.cases.engines.contract import heap_result, read_heap
+from experiments.cases.engines.discharge_files import discharge_result
 from experiments.export import EXPORTERS, ExportedTest, Translation, export_input
+from experiments.export.liggghts_hopper import FILLED_FILE
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
 
@@ -33,8 +35,9 @@ class Driver:
     observables: tuple[str, ...] = ()
 
     def answers(self, case: Case) -> tuple[str, ...]:
-        """Return the name of the heap's file."""
-        return (self._translation(case).heap,)
+        """Return the names of the files of the heap or of the discharge."""
+        heap = self._translation(case).heap
+        return (heap,) if case.scene.leaves_a_heap else (FILLED_FILE, heap)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -53,9 +56,12 @@ class Driver:
         return [self._located(translation), *translation.command[1:]]
 
     def read(self, case: Case, folder: Path) -> CaseResult:
-        """Read the spheres of the heap."""
+        """Read the spheres of the heap, or the weighed discharge of a hopper."""
+        made_by = {"program": EXPORTERS[self.name].code}
+        if not case.scene.leaves_a_heap:
+            return discharge_result(case, folder, made_by)
         [heap] = self.answers(case)
-        return heap_result(*read_heap(folder / heap), {}, {"program": EXPORTERS[self.name].code})
+        return heap_result(*read_heap(folder / heap), {}, made_by)
 
     def _translation(self, case: Case) -> Translation:
         test = ExportedTest(self.name, case, "the case")
