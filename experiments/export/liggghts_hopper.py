@@ -83,7 +83,7 @@ def hopper_meshes(lift: Lift) -> dict[str, str]:
 
 
 def hopper_room(lift: Lift) -> tuple[float, float]:
-    """Return half the width and the bottom of the box, with room for the plug beside the stream [m]."""
+    """Return half the width and the bottom of the box, with room for the plug next to the stream [m]."""
     reach = lift.reach
     return max(lift.scene.room(reach)[0], 1.5 * lift.scene.outlet + 3.0 * reach), -(FALL + 2.0) * reach
 
