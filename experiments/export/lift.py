@@ -88,9 +88,10 @@ class Lift:
             raise InputError(
                 self.test.source, rule + "is given no other", getattr(scene, "name", type(scene).__name__)
             )
-        if isinstance(scene, Hopper) and not self.is_of_spheres:
-            rule = f"the grains must be single spheres: {self.code} is given no hopper of clumps"
-            raise InputError(self.test.source, rule, f"{len(self.templates[0].radii)} spheres")
+        shapes = len(self.case.grains.mixture.shapes)
+        if isinstance(scene, Hopper) and shapes > 1:
+            rule = f"the grains must be of one shape: {self.code} is given no hopper of a mixture"
+            raise InputError(self.test.source, rule, f"{shapes} shapes")
         if isinstance(scene, LiftedCylinder) and scene.lip > 0.0:
             rule = "the plate must have no lip: no code is given one"
             raise InputError(self.test.source, rule, f"lip = {scene.lip:g} m")

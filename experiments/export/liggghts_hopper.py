@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from dem_warp import ClumpShape
 from dem_warp.scenes.discharge import DischargeController
 from dem_warp.scenes.hopper import OVER_OUTLET
 from experiments.export.laws import Translated
@@ -15,7 +16,7 @@ from experiments.export.script_text import rest_loop
 
 FILLED_FILE, DISCHARGE_FILE = "filled.dump", "discharge.txt"
 """Dump of the filled hopper, and the weighed discharge: seconds since the opening, kilograms that are still
-above the floor, grains over the middle of the outlet, all grains above the floor."""
+above the floor, spheres over the middle of the outlet, all spheres above the floor."""
 
 WEIGHED = " c_inside c_over c_stay"
 """Words of the log that keep these sums up to date."""
@@ -32,10 +33,11 @@ fix floor all mesh/surface file floor.stl type 3
 fix plug all mesh/surface file plug.stl type 3
 fix walls all wall/gran model {model} mesh n_meshes 3 meshes bin floor plug
 
-fix motion all nve/sphere
+fix {bodies}
 
-# grains above the floor: mass, number, and number over the middle of the outlet
-variable inside atom "mass * (z >= 0)"
+# spheres above the floor: their share of the mass, number, and number over the middle of the outlet
+compute radius all property/atom radius
+variable inside atom "{weight:.9g} * c_radius * c_radius * c_radius * (z >= 0)"
 variable stay atom "z >= 0"
 variable over atom "(z >= 0) * (x*x+y*y < {middle:.9g})"
 compute inside all reduce sum v_inside
@@ -45,7 +47,7 @@ compute over all reduce sum v_over
 
 _OPEN = """
 # open the outlet, and weigh what is above it at every look
-dump filled all custom 1 {filled} id type x y z radius
+dump filled all custom 1 {filled} id {body} x y z radius
 dump_modify filled sort id format "%d %d %.9g %.9g %.9g %.9g"
 run 0
 undump filled
@@ -95,7 +97,18 @@ def bin_top(lift: Lift) -> float:
 
 def hopper_walls(lift: Lift, model: str) -> str:
     """Write the walls, and the sums that are weighed."""
-    return _WALLS.format(model=model, middle=(OVER_OUTLET * lift.scene.outlet) ** 2)
+    [shape] = lift.case.grains.mixture.shapes
+    return _WALLS.format(
+        model=model,
+        middle=(OVER_OUTLET * lift.scene.outlet) ** 2,
+        bodies="motion all nve/sphere" if lift.is_of_spheres else "bodies all multisphere",
+        weight=lift.case.grain_material.density * volume_share(shape),
+    )
+
+
+def volume_share(shape: ClumpShape) -> float:
+    """Return the volume of a clump over the sum of its spheres' cubed radii: each has its part of it."""
+    return shape.volume / float((shape.radii**3).sum())
 
 
 def hopper_opening(lift: Lift, quit: str) -> str:
@@ -106,6 +119,7 @@ def hopper_opening(lift: Lift, quit: str) -> str:
     limit = SLOWEST * beverloo + DischargeController.SETTLE_LIMIT
     return _OPEN.format(
         filled=FILLED_FILE,
+        body="type" if lift.is_of_spheres else "id_multisphere",
         discharge=DISCHARGE_FILE,
         time_step=lift.case.time_step,
         look=lift.steps(LOOK),

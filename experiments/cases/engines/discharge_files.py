@@ -11,9 +11,9 @@ import numpy as np
 from dem_warp import Case, CaseResult
 from dem_warp.scenes.discharge import DischargeState
 from dem_warp.scenes.surfaces import bed_level
-from experiments.cases.engines.contract import read_heap
+from experiments.cases.engines.contract import heap_result, read_heap
 from experiments.cases.engines.program import AnswerError, empty_result
-from experiments.export.liggghts_hopper import DISCHARGE_FILE, FILLED_FILE
+from experiments.export.liggghts_hopper import DISCHARGE_FILE, FILLED_FILE, volume_share
 from experiments.io.texts import read_text
 
 
@@ -22,22 +22,24 @@ def discharge_result(case: Case[Any], folder: Path, provenance: dict[str, Any]) 
 
     Raise AnswerError when a file is missing or malformed.
     """
-    spheres, _ = read_heap(folder / FILLED_FILE)
+    spheres, grains = read_heap(folder / FILLED_FILE)
     looks = _looks(folder / DISCHARGE_FILE)
     since, mass, over, stay = looks.T
-    scene, volumes = case.scene, 4.0 / 3.0 * np.pi * spheres[:, 3] ** 3
-    filled = float(volumes.sum()) * case.grain_material.density
+    scene, [shape] = case.scene, case.grains.mixture.shapes
+    volume = volume_share(shape) * float((spheres[:, 3] ** 3).sum())
+    filled = volume * case.grain_material.density
     reach = float(spheres[:, 3].max())
-    level = bed_level(spheres[:, :3], scene.cross_section(reach).half_sides, case.grains.grain_reach)
+    centers = heap_result(spheres, grains, {}, {}).positions
+    level = bed_level(centers, scene.cross_section(reach).half_sides, case.grains.grain_reach)
     state = DischargeState("rest")
     # where no grain has fallen the mass is the same to the last bit, in any order of the sum
     _, first, number = np.unique(stay, return_index=True, return_inverse=True)
     out = np.where(stay == len(spheres), 0.0, (filled - mass)[first][number])
     state.fallen = [[0.0, 0.0], *np.column_stack([since, out]).tolist()]
     seen = {
-        "grain_count": float(len(spheres)),
+        "grain_count": float(len(centers)),
         "fill_height": level - scene.floor,
-        "solid_fraction": float(volumes.sum()) / scene.volume_below(level),
+        "solid_fraction": volume / scene.volume_below(level),
         "filled_mass": filled,
         "fallen_mass": float(out[-1]),
         "mass_left": float(mass[-1]),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from exported_lift import GRAIN, ROD, WALL
 
-from dem_warp import PRESETS, Case, ClumpShape, GrainPopulation, Hopper, Interaction, simulate
+from dem_warp import PRESETS, Case, ClumpShape, GrainPopulation, Hopper, Interaction, ShapeMixture, simulate
 from experiments.cases.engines.driver import Driver
 from experiments.cases.engines.program import AnswerError, ProgramEngine
 from experiments.export import ExportedTest, export_input
@@ -21,7 +21,7 @@ COUNT, MASS = 500, 4.0 / 3.0 * math.pi * 1e-9 * GRAIN.density
 """Number and mass of the grains [kg]."""
 
 
-def hopper(seed: int = 1, shape: ClumpShape | None = None, **changes: Any) -> Case[Hopper]:
+def hopper(seed: int = 1, shape: ClumpShape | ShapeMixture | None = None, **changes: Any) -> Case[Hopper]:
     scene = Hopper(0.02, 0.02, 0.012, WALL, rest_speed=3e-3, grain_count=COUNT)
     grains = GrainPopulation(shape or ClumpShape.sphere(1e-3), GRAIN, size_sd=0.0)
     friction = Interaction(0.5, 0.3, 0.05)
@@ -65,8 +65,9 @@ def test_what_a_code_is_not_given_is_refused_by_name() -> None:
     for code in ("lammps", "yade", "deme", "mercurydpm"):
         with pytest.raises(InputError, match=r"must be a lifted-cylinder: .* is given no other, got hopper"):
             export_input(exported(hopper()), code)
-    with pytest.raises(InputError, match="LIGGGHTS is given no hopper of clumps, got 3 spheres"):
-        export_input(exported(hopper(shape=ROD)), "liggghts")
+    mixture = ShapeMixture((ROD, ClumpShape.sphere(1e-3)), (0.5, 0.5))
+    with pytest.raises(InputError, match="LIGGGHTS is given no hopper of a mixture, got 2 shapes"):
+        export_input(exported(hopper(shape=mixture)), "liggghts")
 
 
 def weighed(folder: Path, fallen: np.ndarray, over: int = 0) -> Case[Hopper]:
@@ -102,6 +103,19 @@ def test_grains_over_the_outlet_are_a_failure_and_a_broken_file_no_answer(tmp_pa
         (tmp_path / DISCHARGE_FILE).write_text(text, encoding="utf-8")
         with pytest.raises(AnswerError, match=DISCHARGE_FILE):
             Driver("liggghts").read(case, tmp_path)
+
+
+@pytest.mark.program("liggghts")
+def test_clumps_are_weighed_as_the_union_of_their_spheres() -> None:
+    case = hopper(shape=ROD, diameter=0.03, outlet=0.018, grain_count=80)
+    [result] = ProgramEngine(Driver("liggghts"))([case])
+    assert result.status == "finished", result.reason
+    seen = result.observables
+    # nine digits of each radius
+    assert seen["filled_mass"] == pytest.approx(80 * GRAIN.density * ROD.volume, rel=1e-6)
+    assert seen["fallen_mass"] + seen["mass_left"] == pytest.approx(seen["filled_mass"], rel=1e-6)
+    assert seen["grain_count"] == 80
+    assert 0.0 < seen["fallen_mass"] < seen["filled_mass"]
 
 
 @pytest.mark.program("liggghts")
