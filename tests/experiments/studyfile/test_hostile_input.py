@@ -183,7 +183,7 @@ HOSTILE = {
         TWO_BODIES, "g.stl", "one closed body", "2 bodies", options="--spheres 3", name="g.stl"
     ),
     "a mesh in metres": clump(
-        ONE_BODY.replace("vertex 1 ", "vertex 5600 "), "g.stl", "--unit", "5600 mm", options="--spheres 3",
+        ONE_BODY.replace("1", "5600"), "g.stl", "--unit", "5600 mm", options="--spheres 3",
         name="g.stl",
     ),
     "an open mesh": clump(
