@@ -61,7 +61,7 @@ class Aim:
     found: str
     """With its interval."""
     passed: bool | None
-    """True if the aim is met, None if too few trials ran."""
+    """True if the aim is met, None if nothing was counted."""
 
 
 def scored(findings: pd.DataFrame, labels: Mapping[str, Label], sealed: Sequence[Sealed]) -> pd.DataFrame:
@@ -128,71 +128,46 @@ def by_outsider(table: pd.DataFrame) -> pd.DataFrame:
     return pd.crosstab(hidden, outside["verdict"], rownames=["effect"], colnames=[None])
 
 
-def removed(table: pd.DataFrame) -> np.ndarray:
-    """Share of the held-out excess that is gone, of every right name whose held-out gap was there before.
-
-    The excess is Q less its degrees of freedom, 0 at the least; without one, there is nothing to remove.
-    """
-    right = table[table["right"]]
-    before = np.maximum(right["held_out_before"] - right["held_out_degrees"], 0.0)
-    after = np.maximum(right["held_out_after"] - right["held_out_degrees"], 0.0)
-    there = before > 0
-    return np.asarray(1.0 - after[there] / before[there], dtype=np.float64)
-
-
 def covered(table: pd.DataFrame) -> pd.Series:
     """Return True where the 90 % interval holds the true size, for each right name of one mechanism."""
     right = table[table["right"] & (table["kind"] == Kind.SINGLE)]
     return right["true_size"].between(right["size_low"], right["size_high"])
 
 
-def aims(table: pd.DataFrame, unresolvable: Sequence[str]) -> tuple[Aim, ...]:
+def aims(
+    table: pd.DataFrame, nulls: pd.DataFrame, best: tuple[str, int] | None, foreign: bool
+) -> tuple[Aim, ...]:
     """Hold one view's trials, rows of `scored`, against what was aimed at.
 
-    `unresolvable` are the mechanisms that were declared not resolvable beforehand.
+    Parameters
+    ----------
+    nulls : pandas.DataFrame
+        Trials that hide nothing, of all series that were sealed together.
+    best : (str, int) or None
+        Other method that gives the most right names to the strong effects, and their number.
+    foreign : bool
+        Another code made the heaps.
     """
-    kind, verdict = table["kind"], table["verdict"]
-    nulls, pairs, strong = table[kind == Kind.NULL], table[kind == Kind.PAIR], strong_singles(table)
+    kind, verdict, strong = table["kind"], table["verdict"], strong_singles(table)
     unknown = verdict[kind.isin([Kind.WITHHELD, Kind.OUTSIDE])] == Verdict.UNKNOWN
-    names = table.loc[verdict == Verdict.NAMED, "named"].str.split()
-    forbidden = names.map(lambda these: bool(set(these) & set(unresolvable))).astype(bool)
-    above, outside, two = "one mechanism above 1.5 gamma80", "outside the library", "two mechanisms"
-    enough, each = _mechanism_aims(above, by_mechanism(strong))
+    above, named = "one mechanism above 1.5 gamma80: the right name", int(strong["right"].sum())
+    rival = "no answers" if best is None else f"{named}, {best[0]} {best[1]}, of {len(strong)}"
+    pooled, pairs = share(nulls["alarm"]), table.loc[kind == Kind.PAIR, "right"]
     return (
-        _limit("nothing hidden: alarms", "at most 5 in 100", nulls["alarm"], most=0.05),
-        _limit("nothing hidden: wrong names", "at most 1 in 100", nulls["wrong"], most=0.01),
-        enough,
-        _limit(f"{above}: the right name", "at least 80 %", strong["right"], least=0.80),
-        each,
-        _limit(f"{above}: right or in a tie", "at least 90 %", strong["right"] | strong["tied"], least=0.90),
-        _limit(f"{above}: a wrong name", "at most 3 %", strong["wrong"], most=0.03),
-        _limit(f"{outside}: unknown", "at least 90 % of 60", unknown, least=0.90),
-        _none("names that were declared not resolvable", forbidden),
-        _removed_aim(removed(table)),
-        _limit("named: size within its 90 % interval", "82 to 96 %", covered(table), least=0.82, most=0.96),
-        _limit(f"{two}: both named", "at least half", pairs["right"], least=0.50),
-        _limit(f"{two}: no wrong name", "at least 95 %", ~pairs["wrong"].astype(bool), least=0.95),
-        _none("analyses that crashed", verdict == CRASH),
-    )
-
-
-def foreign_aims(table: pd.DataFrame) -> tuple[Aim, ...]:
-    """Hold one view's trials against what was aimed at where another code makes the heaps."""
-    kind, verdict = table["kind"], table["verdict"]
-    nulls, pairs, strong = table[kind == Kind.NULL], table[kind == Kind.PAIR], strong_singles(table)
-    unknown = verdict[kind.isin([Kind.WITHHELD, Kind.OUTSIDE])] == Verdict.UNKNOWN
-    above, outside, two = "one mechanism above 1.5 gamma80", "outside the library", "two mechanisms"
-    return (
-        _limit("nothing hidden: alarms", "at most 2 in 40", nulls["alarm"], most=0.05),
-        _none("nothing hidden: wrong names", nulls["wrong"]),
-        _limit(f"{above}: the right name", "at least 80 %", strong["right"], least=0.80),
-        _limit(f"{above}: right or in a tie", "at least 90 %", strong["right"] | strong["tied"], least=0.90),
-        _limit(f"{above}: a wrong name", "at most 2 %", strong["wrong"], most=0.02),
-        _limit(f"{outside}: unknown", "at least 90 %", unknown, least=0.90),
-        _limit("named: size within its 90 % interval", "82 to 96 %", covered(table), least=0.82, most=0.96),
-        _limit(f"{two}: a wrong name", "at most 2 %", pairs["wrong"], most=0.02),
-        _limit("any trial: a wrong name", "at most 2 %", table["wrong"], most=0.02),
-        _none("analyses that crashed", verdict == CRASH),
+        _limit("nothing hidden: alarms", "at most 2.5 %", table.loc[kind == Kind.NULL, "alarm"], most=0.025),
+        Aim(
+            "nothing hidden: alarms, with the series sealed together",
+            "upper limit below 8 %",
+            str(pooled),
+            pooled.interval[1] < 0.08 if pooled.trials else None,
+        ),
+        _limit(above, "at least 92 %", strong["right"], least=0.92),
+        Aim(above, "as many as the best other method", rival, None if best is None else named >= best[1]),
+        _limit("any trial: a wrong name", "at most 1 %", table["wrong"], most=0.01),
+        _limit("outside the library: unknown", "at least 95 %", unknown, least=0.95),
+        *([_limit("two mechanisms: both named", "at least 60 %", pairs, least=0.60)] if foreign else []),
+        _limit("named: size within its 90 % interval", "87 to 93 %", covered(table), least=0.87, most=0.93),
+        _limit("analyses that crashed", "none", verdict == CRASH, most=0.0),
     )
 
 
@@ -210,37 +185,10 @@ def unknown_area(table: pd.DataFrame) -> str:
     return area_text(*scores)
 
 
-def _mechanism_aims(above: str, counts: pd.DataFrame) -> tuple[Aim, Aim]:
-    """Aims of strong trials, as `by_mechanism` counts them: that there are enough, and of each mechanism."""
-    some = len(counts) > 0
-    enough = len(counts) >= 8 and bool((counts["trials"] >= 15).all())
-    least = f"{len(counts)} mechanisms, {counts['trials'].min()} trials at least" if some else "none"
-    each = [f"{name} {row.right} of {row.trials}" for name, row in counts.iterrows()]
-    right = bool((counts["right"] >= 11 / 15 * counts["trials"]).all()) if some else None
-    question = f"{above}: the right name, each mechanism"
-    return (
-        Aim("mechanisms with strong trials", "8 mechanisms, 15 trials each", least, enough),
-        Aim(question, "at least 11 of 15", ", ".join(each) or "no trials", right),
-    )
-
-
-def _removed_aim(gone: np.ndarray) -> Aim:
-    question, wanted = "named: held-out excess removed, median", "at least 80 %"
-    if not len(gone):
-        return Aim(question, wanted, "no trials", None)
-    median = float(np.median(gone))
-    return Aim(question, wanted, f"{100 * median:.0f} %, {len(gone)} trials", median >= 0.80)
-
-
-def _none(question: str, column: pd.Series) -> Aim:
-    counted = share(column)
-    return Aim(question, "none", str(counted), counted.count == 0 if counted.trials else None)
-
-
 def _limit(question: str, wanted: str, column: pd.Series, least: float = 0.0, most: float = 1.0) -> Aim:
     found = share(column)
     passed = least <= found.value <= most if found.trials else None
-    value = f"{100 * found.value:.0f} % ({found})" if found.trials else str(found)
+    value = f"{100 * found.value:.1f} % ({found})" if found.trials else str(found)
     return Aim(question, wanted, value, passed)
 
 

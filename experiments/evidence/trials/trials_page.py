@@ -8,15 +8,16 @@ import numpy as np
 import pandas as pd
 
 from experiments.evidence.record_page import markdown_table, write_page
+from experiments.evidence.trials.baselines.answers_table import FOLDER, read_answers
+from experiments.evidence.trials.baselines.method_tables import judged
 from experiments.evidence.trials.declaration import Declaration, read_declaration
 from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, read_findings
 from experiments.evidence.trials.score import (
-    Aim,
     aims,
     by_mechanism,
     by_outsider,
-    foreign_aims,
     scored,
+    strong_singles,
     unknown_area,
 )
 from experiments.evidence.trials.trials_folder import (
@@ -29,7 +30,15 @@ from experiments.evidence.trials.trials_folder import (
     RUNS,
     SEALED,
 )
-from experiments.evidence.trials.truth import opened, read_labels, read_sealed, read_sealed_json, revealed
+from experiments.evidence.trials.truth import (
+    Kind,
+    Label,
+    opened,
+    read_labels,
+    read_sealed,
+    read_sealed_json,
+    revealed,
+)
 from experiments.evidence.trials.truths import STRONG
 
 TITLES = {
@@ -37,7 +46,7 @@ TITLES = {
     OUTLINED: "With every observable, and the outlines of the photographs",
 }
 
-_VERDICTS = {True: "pass", False: "**FAIL**", None: "too few"}
+_VERDICTS = {True: "pass", False: "**FAIL**", None: "open"}
 
 _OURS = """# Blind trials of the search for a missing mechanism
 
@@ -55,7 +64,8 @@ declared beforehand, the settings of the analysis by their hash and the smallest
 each mechanism (gamma80), stands in `declared.json`. An effect is the distance of a size from the mechanism's
 null, counted in gamma80; *strong* is above 1.5. A verdict is right that names the hidden mechanism (or both)
 and nothing else; it is wrong as soon as it names one that is not there. Intervals of shares are 95 %
-(Clopper and Pearson).
+(Clopper and Pearson). The aims are those of the eighteenth and the nineteenth series; earlier ones had milder
+aims ([all series](../README.md)). *Sealed together* are series of one day, scale and settings.
 """
 
 
@@ -66,6 +76,8 @@ class Record:
     declaration: Declaration
     table: pd.DataFrame
     """Rows of `scored`, of every view."""
+    labels: dict[str, Label]
+    """Truths of the trials that have been analysed."""
     sealed: int
     """Number of sealed trials; those that have not been analysed are in no row."""
     reality: dict[str, Any] | None = None
@@ -82,16 +94,14 @@ class Record:
         scale, done = self.declaration.scale or "as written", self.table["trial"].nunique()
         return f"{self.code}, {scale}, {done} of {self.sealed} trials"
 
+    @property
+    def occasion(self) -> tuple[str, str, str]:
+        """Day of the sealing, scale and settings."""
+        return self.declaration.drawn_on, self.declaration.scale, self.declaration.settings.sha256
+
     def in_view(self, view: str = EVERYTHING) -> pd.DataFrame:
         """Return the findings of one view."""
         return self.table[self.table["view"] == view]
-
-    def aims(self, view: str = EVERYTHING) -> tuple[Aim, ...]:
-        """Compare one view with its aims."""
-        rows = self.in_view(view)
-        if self.reality:
-            return foreign_aims(rows)
-        return aims(rows, [effect.name for effect in self.declaration.library if not effect.resolvable])
 
 
 def read_record(folder: Path) -> Record:
@@ -100,12 +110,33 @@ def read_record(folder: Path) -> Record:
     truths = revealed(read_labels(folder / LABELS), opened(sealed, findings["trial"]))
     reality = folder / REALITY
     made_by = read_sealed_json(reality) if reality.is_file() else None
-    return Record(read_declaration(folder / DECLARED), scored(findings, truths, sealed), len(sealed), made_by)
+    declaration = read_declaration(folder / DECLARED)
+    return Record(declaration, scored(findings, truths, sealed), truths, len(sealed), made_by)
+
+
+def sealed_together(folder: Path) -> list[Record]:
+    """Read a record, and those next to it that have its day, scale and settings."""
+    places = [path.parent for path in sorted(folder.resolve().parent.glob(f"*/{RUNS}"))]
+    own, others = read_record(folder), [place for place in places if place != folder.resolve()]
+    records = [own, *map(read_record, others)]
+    return [one for one in records if one.occasion == own.occasion]
+
+
+def best_other(folder: Path, record: Record, strong: pd.DataFrame) -> tuple[str, int] | None:
+    """Find the other method with the most right names of strong effects; None if none has answered all."""
+    counts = {}
+    for path in sorted((folder.resolve().parent / "baselines" / folder.name / FOLDER).glob("*.csv")):
+        answers = read_answers(path)
+        answers = answers[answers["trial"].isin(strong["trial"])]
+        if not path.stem.startswith("search") and 0 < len(strong) == len(answers):
+            counts[path.stem] = int(judged(answers, record.labels)["named_right"].sum())
+    return max(counts.items(), key=lambda one: one[1], default=None)
 
 
 def write_trials_page(folder: Path) -> Path:
     """Write the page of a record from its files, its notes after the introduction."""
-    record, notes = read_record(folder), folder / NOTES
+    together, notes = sealed_together(folder), folder / NOTES
+    record = together[0]
     heaps = _FOREIGN.format(code=record.code) if record.reality else _OURS
     parts = [f"{heaps} {_SEALED}", *([notes.read_text(encoding="utf-8")] if notes.is_file() else [])]
     parts += [_runs(folder / RUNS), _declared(record.declaration)]
@@ -114,7 +145,7 @@ def write_trials_page(folder: Path) -> Path:
     for view, title in TITLES.items():
         if done := len(record.in_view(view)):
             some = f" of {record.sealed}" if done < record.sealed else ""
-            parts += _view(record, view, f"## {title}\n\n{done}{some} trials.")
+            parts += _view(folder, together, view, f"## {title}\n\n{done}{some} trials.")
     return write_page(folder / PAGE, *parts)
 
 
@@ -158,12 +189,14 @@ def _declared(declared: Declaration) -> str:
     return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}"
 
 
-def _view(record: Record, view: str, heading: str) -> list[str]:
-    rows = record.in_view(view)
+def _view(folder: Path, together: list[Record], view: str, heading: str) -> list[str]:
+    record, rows = together[0], together[0].in_view(view)
+    every = pd.concat([one.in_view(view) for one in together])
+    nulls, best = every[every["kind"] == Kind.NULL], best_other(folder, record, strong_singles(rows))
     verdict = "verdict" if len(rows) == record.sealed else "verdict so far"
     table = [
         {"question": aim.question, "wanted": aim.wanted, "found": aim.found, verdict: _VERDICTS[aim.passed]}
-        for aim in record.aims(view)
+        for aim in aims(rows, nulls, best, record.reality is not None)
     ]
     parts = [
         heading,

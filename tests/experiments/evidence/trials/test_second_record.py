@@ -63,7 +63,7 @@ def test_only_what_has_been_analysed_is_revealed(folder: Folder, tmp_path: Path)
     assert "1 of 3 trials" in page
     assert "| verdict so far |" in page
     assert (
-        "| one mechanism above 1.5 gamma80: the right name | at least 80 % | 100 % (1 of 1, 3 to 100 %) |"
+        "| one mechanism above 1.5 gamma80: the right name | at least 92 % | 100.0 % (1 of 1, 3 to 100 %) |"
         in page
     )
     assert "`sjkr`" in page
