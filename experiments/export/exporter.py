@@ -62,7 +62,7 @@ class Translation:
     """Command that runs it in its folder; empty when there is none."""
     heap: str
     """File that a finished run writes: a LAMMPS dump of the spheres of the final heap, ``id type x y z
-    radius`` in metres, or the weighed discharge; empty when there is none."""
+    radius`` in metres, the weighed discharge, or the looks at a drum; empty when there is none."""
     translated: tuple[Translated, ...]
     """Rows of the README, the most important first."""
     warnings: tuple[str, ...] = ()

@@ -8,14 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from dem_warp import Drum, LiftedCylinder
 from experiments.export import lammps_text as text
 from experiments.export.code_table import CodeTest, code_exporter, code_laws
 from experiments.export.contact import Contact, values
+from experiments.export.drum import TURNED_FILE, drum_rows, lammps_drum, lammps_turning
 from experiments.export.exporter import Translation
 from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift, Template
 from experiments.export.lift_rows import lift_rows, lift_warnings
-from experiments.export.script_text import HEAP_FILE, clear_loop, fill_loop, rest_loop, watched
+from experiments.export.script_text import HEAP_FILE, clear_loop, fill_loop, rest_loop, space_words, watched
 
 INPUT = "lift.in"
 
@@ -42,7 +44,7 @@ fix fallen all evaporate {look} {count} fallen {seed}{whole}
 
 _RAIN = """
 # filling: {rate:.6g} grains a second, {count} of them
-region rain cylinder z 0 0 {radius:.6g} {bottom:.6g} {top:.6g}
+region rain {space}
 fix rain all pour {count} {first_type} {seed} region rain vel 0 0 0 0 -{speed} &
     vol {vol:.9g} 1000 {kinds}
 
@@ -110,11 +112,11 @@ def granular_words(contact: Contact, words: Mapping[str, str], surface_energy: f
 
 
 def translate(test: CodeTest) -> Translation:
-    """Write the input of a lifted cylinder and its molecules."""
+    """Write the input of a lifted cylinder or a drum, and its molecules."""
     lift = test.lift
-    files = {INPUT: _setup(test) + _filling(lift) + _lifting(lift)}
-    if not lift.is_of_spheres:
-        files |= {text.molecule_file(n): text.molecule_text(each) for n, each in enumerate(lift.templates, 1)}
+    if isinstance(lift.scene, Drum):
+        return _drum(test)
+    files = {INPUT: _setup(test, *_lift_walls(test)) + _filling(lift) + _lifting(lift), **_molecules(lift)}
     tilted = ("scene tilt: LAMMPS pours along gravity alone; left out",) if lift.scene.tilt else ()
     upright = f"(0, 0, -{_gravity(lift):.4g}) m/s2"
     rows = (
@@ -127,9 +129,28 @@ def translate(test: CodeTest) -> Translation:
     return Translation(files, INPUT, ("lmp", "-in", INPUT), HEAP_FILE, translated, warnings)
 
 
-def _setup(test: CodeTest) -> str:
+def _drum(test: CodeTest) -> Translation:
+    lift, input = test.lift, "drum.in"
+    x, y, bottom = lift.scene.room(lift.reach)
+    walls = lammps_drum(lift, granular_words(test.contacts[1], test.words))
+    setup = _setup(test, walls, (-x, x, -y, y, bottom, lift.scene.diameter - bottom))
+    files = {input: setup + _filling(lift) + lammps_turning(lift), **_molecules(lift)}
+    rows = (*test.rows, *drum_rows(lift, exact=True), *test.notes)
+    warnings = test.warnings + lift_warnings(lift)
+    return Translation(files, input, ("lmp", "-in", input), TURNED_FILE, rows, warnings)
+
+
+def _molecules(lift: Lift) -> dict[str, str]:
+    """Return the files of the clumps; spheres need none."""
+    if lift.is_of_spheres:
+        return {}
+    return {text.molecule_file(n): text.molecule_text(each) for n, each in enumerate(lift.templates, 1)}
+
+
+def _lift_walls(test: CodeTest) -> tuple[str, tuple[float, ...]]:
+    """Return the walls of a lifted cylinder, and the sides of the box [m]."""
     lift, scene = test.lift, test.lift.scene
-    among, with_tube, with_plate = (granular_words(contact, test.words) for contact in test.contacts)
+    with_tube, with_plate = (granular_words(contact, test.words) for contact in test.contacts[1:])
     half_width, _, bottom = scene.room(lift.reach)
     plate, gravity = f"fix plate all wall/gran granular {with_plate} zplane 0 NULL\n", _gravity(lift)
     rain_top = lift.rain_bottom + lift.rain_height
@@ -137,8 +158,14 @@ def _setup(test: CodeTest) -> str:
         plate = _plate(lift, scene.plate_diameter / 2, with_plate, bottom)
         bottom -= LOOK * math.sqrt(scene.rain_speed**2 + 2.0 * gravity * rain_top) + lift.reach
     sides = (-half_width, half_width, -half_width, half_width, bottom, rain_top + 2.0 * lift.reach)
+    tube = _TUBE.format(radius=scene.diameter / 2, height=scene.height, words=with_tube)
+    return tube + plate, sides
+
+
+def _setup(test: CodeTest, walls: str, sides: Sequence[float]) -> str:
+    lift, among = test.lift, granular_words(test.contacts[0], test.words)
     names = " ".join(text.molecule_file(n) for n in range(1, len(lift.templates) + 1))
-    upright = (0.0, 0.0, -gravity)
+    upright = (0.0, 0.0, -_gravity(lift))
     spheres = lift.is_of_spheres
     parts = [
         text.head(
@@ -150,13 +177,12 @@ def _setup(test: CodeTest) -> str:
         text.neighbors(lift.skin, 2.0 * lift.largest_radius + lift.skin),
         "\n# contacts\n",
         text.contacts({"* *": among}, lift.case.time_step),
-        _TUBE.format(radius=scene.diameter / 2, height=scene.height, words=with_tube),
-        plate,
+        walls,
         "\n# grains\n",
         text.weight(upright) + "fix motion all nve/sphere\n"
         if spheres
         else text.BODY_NUMBERS + text.rigid_bodies(upright),
-        _rain(lift, rain_top),
+        _rain(lift, lift.rain_bottom + lift.rain_height),
         watched(lift),
     ]
     return "".join(parts)
@@ -180,9 +206,7 @@ def _rain(lift: Lift, top: float) -> str:
     return _RAIN.format(
         rate=lift.rain_rate,
         count=lift.count,
-        radius=lift.rain_radius - lift.reach,
-        bottom=lift.rain_bottom,
-        top=top,
+        space=space_words(lift.rain_section, lift.rain_bottom, top, lift.reach),
         first_type=1 if lift.is_of_spheres else 0,
         seed=lift.seeds(1)[0],
         speed=lift.scene.rain_speed,
@@ -216,7 +240,7 @@ def grains_at_once(lift: Lift) -> int:
 
 def _volume_fraction(lift: Lift) -> float:
     # LAMMPS makes the number of grains of an insertion from it
-    area = math.pi * (lift.rain_radius - lift.reach) ** 2
+    area = lift.rain_section.open_area(lift.reach)
     if lift.is_of_spheres:
         one = sum(t.fraction * 4.0 / 3.0 * math.pi * t.radii[0] ** 3 for t in lift.templates)
     else:
@@ -271,7 +295,7 @@ def tsuji_restitution(damping: float) -> float:
     return float(brentq(above, *ends))
 
 
-LAMMPS = code_exporter("lammps", translate, contact_numbers)
+LAMMPS = code_exporter("lammps", translate, contact_numbers, (LiftedCylinder, Drum))
 
 CONVENTIONS = code_laws("lammps")
 """Contact laws that it has."""

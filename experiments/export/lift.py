@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp import Case, ClumpShape, Hopper, LiftedCylinder
+from dem_warp import Case, ClumpShape, Drum, LiftedCylinder
+from dem_warp.scenes.drum import HATCH
 from dem_warp.scenes.lifted_cylinder import LiftController
 from dem_warp.scenes.phases import CALM
+from dem_warp.scenes.rain import CrossSection
 from experiments.export.exporter import ExportedTest
 from experiments.export.sizes import classes_of
 from experiments.io.errors import InputError
@@ -67,7 +69,7 @@ class Template:
 
 @dataclass(frozen=True)
 class Lift:
-    """Lifted cylinder, or a hopper, and the numbers that follow from its case.
+    """Lifted cylinder, hopper or drum, and the numbers that follow from its case.
 
     Raises
     ------
@@ -89,12 +91,16 @@ class Lift:
                 self.test.source, rule + "is given no other", getattr(scene, "name", type(scene).__name__)
             )
         shapes = len(self.case.grains.mixture.shapes)
-        if isinstance(scene, Hopper) and shapes > 1:
-            rule = f"the grains must be of one shape: {self.code} is given no hopper of a mixture"
+        if not isinstance(scene, LiftedCylinder) and shapes > 1:
+            rule = f"the grains must be of one shape: {self.code} is given no {self.scene.name} of a mixture"
             raise InputError(self.test.source, rule, f"{shapes} shapes")
         if isinstance(scene, LiftedCylinder) and scene.lip > 0.0:
             rule = "the plate must have no lip: no code is given one"
             raise InputError(self.test.source, rule, f"lip = {scene.lip:g} m")
+        if isinstance(scene, Drum) and scene.is_hatched:
+            rule = "the drum must be level and filled to a half at most: no code is given another"
+            found = f"inclination = {math.degrees(scene.inclination):g} deg, filling = {scene.filling:g}"
+            raise InputError(self.test.source, rule, found)
 
     @property
     def case(self) -> Case[Any]:
@@ -158,19 +164,26 @@ class Lift:
         return self.scene.supply(self.case)
 
     @property
-    def rain_radius(self) -> float:
-        """Radius about the axis that the rain stays in [m]."""
-        return self.scene.diameter / 2 - 0.5 * self.skin
+    def rain_section(self) -> CrossSection:
+        """Opening that the rain stays in: a circle, in a drum the rectangle that fits at the rain's top."""
+        radius, gap = self.scene.diameter / 2, 0.5 * self.skin
+        if not isinstance(self.scene, Drum):
+            return CrossSection.circle(radius - gap)
+        top = self.rain_bottom + self.rain_height + self.reach
+        return CrossSection((math.sqrt(radius**2 - (top - radius) ** 2) - gap, self.scene.length / 2 - gap))
 
     @property
     def rain_bottom(self) -> float:
         """Lowest height that a grain is put at [m]."""
-        return self.scene.brim + self.reach + self.skin
+        return self.scene.release(self.reach) + self.skin
 
     @property
     def rain_height(self) -> float:
-        """Height of the space that grains are put in, three diameters of the largest [m]."""
-        return 6.0 * self.reach
+        """Height of the space that grains are put in [m]: three of the largest grain, or a drum's room."""
+        height = 6.0 * self.reach
+        if not isinstance(self.scene, Drum):
+            return height
+        return min(height, (1.0 + HATCH) * self.scene.diameter / 2 - self.rain_bottom - self.reach)
 
     @property
     def rain_period(self) -> float:
@@ -186,7 +199,7 @@ class Lift:
     def rain_rate(self) -> float:
         """Grains a second: the scene's, or the most that find a place."""
         volume = self.case.grains.mean(lambda shape: shape.volume)
-        area = math.pi * max(self.rain_radius - self.reach, 0.3 * self.rain_radius) ** 2
+        area = self.rain_section.open_area(self.reach)
         return min(self.given_rate, RAIN_DENSITY * self.scene.rain_speed * area / volume)
 
     @property

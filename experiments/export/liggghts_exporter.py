@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dem_warp import Hopper, LiftedCylinder
+from dem_warp import Drum, Hopper, LiftedCylinder
 from experiments.export import liggghts_text as text
 from experiments.export.code_table import CodeTest, code_exporter, code_laws
+from experiments.export.drum import (
+    TURNED_FILE,
+    drum_meshes,
+    drum_rows,
+    liggghts_drum,
+    liggghts_turning,
+)
 from experiments.export.exporter import Translation
 from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift, disc, prism, stl_text
@@ -50,9 +57,11 @@ undump heap
 
 
 def translate(test: CodeTest) -> Translation:
-    """Write the input of a lifted cylinder or a hopper and its meshes."""
+    """Write the input of a lifted cylinder, a hopper or a drum, and its meshes."""
     if isinstance(test.lift.scene, Hopper):
         return _hopper(test)
+    if isinstance(test.lift.scene, Drum):
+        return _drum(test)
     lift, scene = test.lift, test.lift.scene
     files = {TUBE_FILE: stl_text("tube", prism(scene.diameter / 2, scene.height))}
     if scene.plate_diameter is not None:
@@ -78,6 +87,17 @@ def _hopper(test: CodeTest) -> Translation:
     return Translation(files, input, ("liggghts", "-in", input), DISCHARGE_FILE, rows, warnings)
 
 
+def _drum(test: CodeTest) -> Translation:
+    lift, model, input = test.lift, text.model_words(test.words), "drum.in"
+    half_x, half_y, bottom = lift.scene.room(lift.reach)
+    room, types = (max(half_x, half_y), bottom), ("grains", "shell", "ends")
+    setup = _setup(test, model, types, room, lift.scene.diameter, liggghts_drum(lift, model))
+    parts = [setup, watched(lift), *_filling(lift), liggghts_turning(lift)]
+    files = {input: "".join(parts)} | drum_meshes(lift)
+    rows, warnings = (*test.rows, *drum_rows(lift)), test.warnings + lift_warnings(lift)
+    return Translation(files, input, ("liggghts", "-in", input), TURNED_FILE, rows, warnings)
+
+
 def _setup(
     test: CodeTest,
     model: str,
@@ -97,7 +117,7 @@ def _setup(
         return (among, tube, plate)[max(i, j) if min(i, j) == 0 or i == j else 1]
 
     rain = Rain(
-        lift.rain_radius,
+        lift.rain_section,
         lift.rain_bottom - lift.reach,
         rain_top,
         lift.count,
@@ -159,7 +179,7 @@ def _lifting(lift: Lift) -> list[str]:
     return [lifting, rest_loop(lift, "rest", _QUIT), _END]
 
 
-LIGGGHTS = code_exporter("liggghts", translate, kinds=(LiftedCylinder, Hopper))
+LIGGGHTS = code_exporter("liggghts", translate, kinds=(LiftedCylinder, Hopper, Drum))
 
 CONVENTIONS = code_laws("liggghts")
 """Contact laws that it has."""

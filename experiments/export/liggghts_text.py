@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from experiments.export.lift import Template
-from experiments.export.script_text import Rain, plain
+from experiments.export.script_text import Rain, plain, space_words
 
 _HEAD = """\
 atom_style granular
@@ -32,7 +32,7 @@ timestep {time_step:.9g}
 _RAIN = """\
 {templates}
 fix sizes all particledistribution/discrete/numberbased {sizes_seed} {kinds} {fractions}
-region rain cylinder z 0 0 {rain.radius:.6g} {rain.bottom:.6g} {rain.top:.6g} units box
+region rain {space} units box
 fix rain all insert/rate/region seed {rain_seed} distributiontemplate sizes &
     nparticles {count} particlerate {rate:.6g} insert_every {rain.steps} overlapcheck yes all_in yes &
     maxattempt 500 vel constant 0 0 -{rain.speed} orientation random region rain ntry_mc 10000
@@ -125,6 +125,7 @@ def pouring(kinds: Sequence[tuple[Template, float, int]], rain: Rain, seeds: Seq
         kinds=len(kinds),
         fractions=" ".join(f"grain{number} {part:.9g}" for number, (_, part, _) in enumerate(kinds, 1)),
         rain=rain,
+        space=space_words(rain.section, rain.bottom, rain.top),
         count=rain.count,
         rate=rain.rate,
         rain_seed=rain_seed,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from dem_warp.scenes.lifted_cylinder import LiftController
 from dem_warp.scenes.poured_controller import HEAPED
+from dem_warp.scenes.rain import CrossSection
 from experiments.export.lift import LOOK, Lift
 
 HEAP_FILE = "heap.dump"
@@ -79,10 +80,10 @@ variable looks delete
 class Rain:
     """Space, number and rate of the grains that are poured."""
 
-    radius: float
+    section: CrossSection
     bottom: float
     top: float
-    """Cylinder that they are put in [m]."""
+    """Opening, and lower and upper end of the space that they are put in [m]."""
     count: int
     rate: float
     """Grains a second."""
@@ -95,6 +96,13 @@ class Rain:
 def plain(numbers: Iterable[float], digits: int = 9) -> str:
     """Write numbers with spaces between, each with some significant digits."""
     return " ".join(f"{number:.{digits}g}" for number in numbers)
+
+
+def space_words(section: CrossSection, bottom: float, top: float, margin: float = 0.0) -> str:
+    """Write the space between two heights, a margin within an opening [m], as a region of both codes."""
+    x, y = (half - margin for half in section.half_sides)
+    sides = f"cylinder z 0 0 {x:.6g}" if section.is_round else f"block {plain((-x, x, -y, y), 6)}"
+    return f"{sides} {bottom:.6g} {top:.6g}"
 
 
 def watched(lift: Lift, look: int | None = None, more: str = "") -> str:

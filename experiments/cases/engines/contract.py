@@ -18,7 +18,7 @@ from dem_warp import Case, CaseResult, GrainPopulation, Material
 from dem_warp.population import SIZE_LIMIT
 from experiments.cases.engines.program import AnswerError, empty_result
 from experiments.cases.engines.surfaces import stl_text, triangles_of
-from experiments.grains.spheres import read_spheres
+from experiments.grains.spheres import SphereFile, read_spheres
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
 from experiments.studyfile.engine_section import words_of
@@ -283,6 +283,11 @@ def read_heap(path: Path) -> tuple[np.ndarray, np.ndarray]:
         found = read_spheres(path)
     except InputError as error:
         raise AnswerError(str(error).replace(str(path), path.name)) from error
+    return grains_of(found)
+
+
+def grains_of(found: SphereFile) -> tuple[np.ndarray, np.ndarray]:
+    """Return the spheres of a file [m], (n, 4), and the number of each one's grain, (n,)."""
     bodies = np.arange(len(found.spheres)) if found.bodies is None else found.bodies
     return found.spheres * (found.unit or 1.0), np.unique(bodies, return_inverse=True)[1].ravel()
 

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import experiments.export
-from dem_warp import Case, CaseResult
+from dem_warp import Case, CaseResult, Drum
 from dem_warp.provenance import source_meaning
 from experiments.cases.engines.contract import heap_result, read_heap
 from experiments.cases.engines.discharge_files import discharge_result
+from experiments.cases.engines.drum_files import drum_result
 from experiments.export import EXPORTERS, ExportedTest, Translation, export_input
 from experiments.export.liggghts_hopper import FILLED_FILE
 from experiments.io.errors import InputError
@@ -35,7 +36,7 @@ class Driver:
     observables: tuple[str, ...] = ()
 
     def answers(self, case: Case) -> tuple[str, ...]:
-        """Return the names of the files of the heap or of the discharge."""
+        """Return the names of the files of the heap, or of the filled container and what happened then."""
         heap = self._translation(case).heap
         return (heap,) if case.scene.leaves_a_heap else (FILLED_FILE, heap)
 
@@ -56,8 +57,10 @@ class Driver:
         return [self._located(translation), *translation.command[1:]]
 
     def read(self, case: Case, folder: Path) -> CaseResult:
-        """Read the spheres of the heap, or the weighed discharge of a hopper."""
+        """Read the spheres of the heap, the weighed discharge of a hopper, or the looks at a drum."""
         made_by = {"program": EXPORTERS[self.name].code}
+        if isinstance(case.scene, Drum):
+            return drum_result(case, folder, made_by)
         if not case.scene.leaves_a_heap:
             return discharge_result(case, folder, made_by)
         [heap] = self.answers(case)

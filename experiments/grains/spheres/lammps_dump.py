@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.grains.spheres.sphere_file import TYPES, Columns, Format, SphereFile, spheres_of
+from experiments.grains.spheres.sphere_file import LARGEST, TYPES, Columns, Format, SphereFile, spheres_of
 from experiments.io.errors import InputError
+from experiments.io.files import check_file
 
 PLACES = ("x", "xu", "xs", "xsu")
 """Columns of a place, in order of preference."""
@@ -118,17 +119,29 @@ def _read(path: Path, frames: Callable[[Path], Iterator[_Frame]] = _frames) -> S
     if chosen is None or last is None:
         problem = "has no complete frame: ITEM: ATOMS needs as many lines as its NUMBER OF ATOMS"
         raise InputError(str(path), problem)
-    place = f"{path}, line {chosen.first_row - 1}"
-    lengths, scaled = _columns(chosen.columns, place)
-    rows = ((chosen.first_row + n, row.split()) for n, row in enumerate(chosen.items["ATOMS"]))
     description = f"LIGGGHTS or LAMMPS dump, frame {position} of {count} (timestep {chosen.step})"
     if chosen is not last:
         description += ", the last complete one"
+    return _spheres(chosen, description, path)
+
+
+def read_looks(path: Path) -> Iterator[tuple[int, SphereFile]]:
+    """Yield the step and the spheres of each frame of a text dump; raise InputError for an incomplete one."""
+    check_file(path, LARGEST)
+    for frame in _frames(path):
+        if not (frame.is_whole and frame.columns and frame.step.isdecimal()):
+            raise InputError(f"{path}, line {frame.line}", "must be a complete frame with its time step")
+        yield int(frame.step), _spheres(frame, f"timestep {frame.step}", path)
+
+
+def _spheres(frame: _Frame, description: str, path: Path) -> SphereFile:
+    lengths, scaled = _columns(frame.columns, f"{path}, line {frame.first_row - 1}")
+    rows = ((frame.first_row + n, row.split()) for n, row in enumerate(frame.items["ATOMS"]))
     read = spheres_of(description, rows, lengths, path)
     if scaled:
-        low, high = _box(chosen, f"{path}, line {chosen.line}")
+        low, high = _box(frame, f"{path}, line {frame.line}")
         read.spheres[:, :3] = low + read.spheres[:, :3] * (high - low)
-    unit = UNITS_OF.get(next(iter(chosen.items.get("UNITS", [])), "").strip())
+    unit = UNITS_OF.get(next(iter(frame.items.get("UNITS", [])), "").strip())
     alone = read.bodies is not None and not read.bodies.any()
     return replace(read, bodies=None if alone else read.bodies, unit=unit)
 

@@ -86,7 +86,7 @@ class Bench:
         volume = float(
             np.dot([t.fraction for t in self.templates], [t.mass / t.density for t in self.templates])
         )
-        room = math.pi * self.lift.rain_radius**2 * self.lift.rain_height
+        room = self.lift.rain_section.open_area(0.0) * self.lift.rain_height
         return min(self.scene.rain_rate, DENSEST_RAIN * room / (volume * self.rain_period))
 
     def adhesion(self) -> float:

@@ -96,7 +96,7 @@ def _setup(bench: Bench) -> str:
     pair_model = text.model_words(words | {"cohesion": cohesion})
     fill = lift.steps(lift.count / bench.rain_rate + FILL_MARGIN)
     rain = Rain(
-        lift.rain_radius,
+        lift.rain_section,
         lift.rain_bottom - lift.reach,
         bench.rain_top,
         lift.count,
