@@ -18,8 +18,8 @@ WORSE = 2.0
 """Standard deviations of the difference of two Qs beyond which fresh runs withdraw a name
 (``trials/record/README.md``)."""
 
-LIKELIHOOD = "minus twice the log-likelihood, held-out conditions included"
-"""Name of a score, in reasons."""
+MANY = 1e6
+"""Largest ratio of likelihoods that is stated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +116,7 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
         if len(best.mechanisms) > 1:
             return Conclusion(Verdict.UNKNOWN, (), open_pairs([assessments[i] for i in close]), None)
         names = tuple(assessments[i].mechanisms[0] for i in close)
-        most = max(rivals[i].behind for i in close)
-        reason = (
-            f"{titles} explain the data alike: at most {most:.1f} apart as ties are judged, in {LIKELIHOOD}"
-        )
+        reason = f"{titles} explain the data alike: noise and errors of the predictions hide which is right"
         return Conclusion(Verdict.TIE, names, reason, passing[0])
     if passing and best.declared:
         return _named(assessments, order[0], order[1:])
@@ -207,8 +204,9 @@ def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]
     )
     if others:
         second = assessments[others[0]]
-        behind = second.score - best.score
-        reason += f", and the next, {_title(second)}, is {behind:.0f} behind in {LIKELIHOOD}"
+        odds = math.exp(min((second.score - best.score) / 2.0, math.log(2.0 * MANY)))
+        times = f"{odds:,.0f}" if odds < MANY else "over a million"
+        reason += f", and the data are {times} times as likely with it as with the next, {_title(second)}"
     return Conclusion(Verdict.NAMED, best.mechanisms, reason, chosen)
 
 
@@ -217,7 +215,7 @@ def _answer(answer: Answer) -> str:
         Question.SIZE: "Q =",
         Question.FALL: f"{_spaced(answer.mechanism)} would lower Q by",
         Question.SCORES: "the squared scores sum to",
-        Question.COMMON: "deviations common to all conditions have a sum of squares of",
+        Question.COMMON: "all conditions deviate alike, with a sum of squares of",
     }[answer.question]
     return f"{statistic} {answer.value:.1f}, limit {answer.limit:.1f}"
 

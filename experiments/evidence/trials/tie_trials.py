@@ -3,7 +3,7 @@
     python -m experiments.evidence.trials.tie_trials
     python -m experiments.evidence.trials.tie_trials --fresh-runs 4 --count 50 --table out/ties-more.csv
 
-The world is that of `slip_trials`; the search has a bank that is drawn from it, and fresh runs. Where it ends
+The world is `emulated_world`; the search has a bank that is drawn from it, and fresh runs. Where it ends
 in a tie, each condition is repeated in turn, or every condition, in as many heaps in all as the search
 proposes, and searched again.
 """

@@ -67,6 +67,7 @@ def test_a_complete_model_lacks_nothing_and_costs_no_run() -> None:
 def test_a_hidden_mechanism_is_named_with_its_size() -> None:
     found, _ = _named()
     assert found.verdict == Verdict.NAMED
+    assert "times as likely with it as with the next, " in found.reason
     assert found.named == ("delta",)
     assert found.chosen is not None
     size = found.chosen.sizes[0]

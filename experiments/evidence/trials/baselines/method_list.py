@@ -7,6 +7,7 @@ from experiments.evidence.trials.baselines.methods.bic import Bic
 from experiments.evidence.trials.baselines.methods.boosting import Boosting
 from experiments.evidence.trials.baselines.methods.inference import Sbi, is_installed
 from experiments.evidence.trials.baselines.methods.lisdd import Lisdd
+from experiments.evidence.trials.baselines.methods.sbmi import Sbmi
 from experiments.evidence.trials.baselines.methods.search_method import Search, Simulator
 from experiments.evidence.trials.baselines.protocol import Method
 
@@ -23,6 +24,7 @@ def methods(simulator: Simulator | None) -> dict[str, Method]:
         Lisdd(),
         Boosting(),
         Sbi(),
+        Sbmi(),
     ]
     if simulator is not None:
         found.insert(0, Search(SEARCH, simulator))
@@ -30,5 +32,5 @@ def methods(simulator: Simulator | None) -> dict[str, Method]:
 
 
 def installed(known: Mapping[str, Method]) -> dict[str, Method]:
-    """Leave out the method whose optional library is not installed."""
-    return {name: method for name, method in known.items() if name != Sbi.name or is_installed()}
+    """Leave out the methods whose optional library is not installed."""
+    return {name: each for name, each in known.items() if name not in (Sbi.name, Sbmi.name) or is_installed()}

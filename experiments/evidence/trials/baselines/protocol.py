@@ -78,6 +78,13 @@ class Problem:
         systematic = self.settings.systematic
         return Stack(Model(self.emulator, mechanisms, systematic, views=self.evidence.views), self.blocks)
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What trials have alike that share what was learned: bank, library and number of means."""
+        stack = self.stack(())
+        center = stack.model.predict(np.zeros((1, len(stack.model.lower))), stack.blocks[0].condition)
+        return self.emulator.space.names, float(center.sum()), len(stack.target)
+
     def fitted(self, mechanisms: Mechanisms = ()) -> Fitted:
         """Return a model at its largest likelihood."""
         if mechanisms not in self._fits:

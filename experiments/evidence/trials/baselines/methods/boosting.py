@@ -13,7 +13,7 @@ import numpy as np
 
 from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.fitting.model_fit import Fitted, minimise, weigh
-from experiments.evidence.trials.baselines.methods.contest import judged
+from experiments.evidence.trials.baselines.methods.contest import by_posterior
 from experiments.evidence.trials.baselines.methods.inference import drawn_means
 from experiments.evidence.trials.baselines.protocol import ODDS, Answer, Mechanisms, Problem
 
@@ -33,18 +33,12 @@ class Boosting:
 
     def __call__(self, problem: Problem) -> Answer:
         """Look at the scores of the measured means."""
-        stack = problem.stack(())
-        center = stack.model.predict(np.zeros((1, len(stack.model.lower))), stack.blocks[0].condition)
-        key = (problem.emulator.space.names, float(center.sum()), len(stack.target))
-        if key not in self._learned:
-            self._learned[key] = _learn(problem)
-        trees, reference, models = self._learned[key]
+        if problem.key not in self._learned:
+            self._learned[problem.key] = _learn(problem)
+        trees, reference, models = self._learned[problem.key]
         found = np.zeros(len(models))
-        found[trees.classes_] = trees.predict_proba(features(reference, stack.target[None]))[0]
-        plain, others = found[0], found[1:].clip(1e-12)
-        weights = dict(zip(models[1:], (others / others.sum()).tolist(), strict=True))
-        score = float(np.log(others.sum()) - np.log(max(plain, 1e-12)))
-        return judged(problem, score, float(np.log(ODDS)), weights, ODDS)
+        found[trees.classes_] = trees.predict_proba(features(reference, problem.stack(()).target[None]))[0]
+        return by_posterior(problem, models, found)
 
 
 def _learn(problem: Problem) -> tuple[Any, Fitted, tuple[Mechanisms, ...]]:

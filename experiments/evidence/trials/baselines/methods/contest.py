@@ -5,13 +5,13 @@ of squares of its residuals, as the authors of both criteria ask (Gelman, Meng a
 Anderson 2002): a model that fails is not named, and what is missing is said to be unknown.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import comb
 
 import numpy as np
 from scipy import stats
 
-from experiments.evidence.trials.baselines.protocol import Answer, Mechanisms, Problem
+from experiments.evidence.trials.baselines.protocol import ODDS, Answer, Mechanisms, Problem
 
 FIT_LEVEL = 0.05
 """Probability that a true model fails the check."""
@@ -29,6 +29,14 @@ def prior_of_one(count: int) -> dict[int, float]:
     Single ones have half, pairs half, shared evenly (Scott and Berger 2010).
     """
     return {1: 0.5 / count, 2: 0.5 / max(comb(count, 2), 1)}
+
+
+def by_posterior(problem: Problem, models: Sequence[Mechanisms], found: np.ndarray) -> Answer:
+    """Answer from probabilities of models, the base first."""
+    plain, others = float(found[0]), found[1:].clip(1e-12)
+    weights = dict(zip(models[1:], (others / others.sum()).tolist(), strict=True))
+    score = float(np.log(others.sum()) - np.log(max(plain, 1e-12)))
+    return judged(problem, score, float(np.log(ODDS)), weights, ODDS)
 
 
 def judged(

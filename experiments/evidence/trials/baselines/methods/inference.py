@@ -62,9 +62,9 @@ class Sbi:
         rng = np.random.default_rng(problem.seed)
         base = problem.stack(())
         drawn = drawn_means(problem, rng)
-        with _quiet_torch(problem.seed):
+        with quiet_torch(problem.seed):
             network = _trained(drawn)
-            references = predicted_means(base, rng, REFERENCES)
+            _, references = predicted_means(base, rng, REFERENCES)
             score, limit = _distance(network, base.target[None], references)
             posterior = _posterior(network, base.target, len(drawn.models))
         others = posterior[1:] / posterior[1:].sum()
@@ -93,36 +93,46 @@ class Drawn:
     """(draws, means)."""
     model: np.ndarray
     """Number of the model that each draw is of, (draws,)."""
+    parameters: np.ndarray
+    """Coded factors, and sizes of all mechanisms: NaN where a model has not got one, (draws, parameters)."""
 
 
-def drawn_means(problem: Problem, rng: np.random.Generator) -> Drawn:
+def drawn_means(problem: Problem, rng: np.random.Generator, times: int = 1) -> Drawn:
     """Draw from the base, every mechanism and every pair, of each by its prior probability."""
     names = problem.emulator.space.names
     models: tuple[Mechanisms, ...] = ((), *problem.singles, *combinations(names, 2))
     share = {0: 0.5} | {size: 0.5 * prior for size, prior in prior_of_one(len(names)).items()}
-    counts = [max(round(POINTS * share[len(model)]), 1) for model in models]
-    parts = [
+    counts = [max(round(times * POINTS * share[len(model)]), 1) for model in models]
+    drawn = [
         predicted_means(problem.stack(model), rng, count, REPEATS)
         for model, count in zip(models, counts, strict=True)
     ]
-    return Drawn(models, np.concatenate(parts), np.repeat(np.arange(len(models)), [len(p) for p in parts]))
+    parameters, means = map(np.concatenate, zip(*drawn, strict=True))
+    return Drawn(models, means, np.repeat(np.arange(len(models)), [len(x) for x, _ in drawn]), parameters)
 
 
-def predicted_means(stack: Stack, rng: np.random.Generator, points: int, repeats: int = 1) -> np.ndarray:
+def predicted_means(
+    stack: Stack, rng: np.random.Generator, points: int, repeats: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
     """Means as the model has them at points in its ranges, with errors drawn so often at each.
 
     Returns
     -------
-    (points * repeats, means) array
+    (points * repeats, parameters), (points * repeats, means) array
+        Parameters of all mechanisms, NaN for those that the model lacks.
     """
-    size = len(stack.target)
+    size, space = len(stack.target), stack.model.emulator.space
     x = rng.uniform(stack.model.lower, stack.model.upper, (points, len(stack.model.lower)))
     noise = [rng.standard_normal((repeats, size)) @ np.linalg.cholesky(stack.covariance(row)).T for row in x]
-    return np.asarray(stack.predict(x)[:, None] + np.array(noise)).reshape(-1, size)
+    every = np.full((points, len(space.factors) + len(space.names)), np.nan)
+    own = [len(space.factors) + space.names.index(name) for name in stack.model.mechanisms]
+    every[:, [*range(len(space.factors)), *own]] = x
+    means = stack.predict(x)[:, None] + np.array(noise)
+    return np.repeat(every, repeats, axis=0), means.reshape(-1, size)
 
 
 @contextmanager
-def _quiet_torch(seed: int) -> Iterator[None]:
+def quiet_torch(seed: int) -> Iterator[None]:
     """Let torch draw from a seed of its own, and say nothing."""
     import torch
 
@@ -168,7 +178,7 @@ def _trained(drawn: Drawn) -> CategoricalMassEstimator:
         )
 
     trainer = NPE(density_estimator=build, tracker=_NoTracker(), show_progress_bars=False)
-    trainer.append_simulations(_tensor(drawn.model[:, None]), _tensor(drawn.means))
+    trainer.append_simulations(tensor(drawn.model[:, None]), tensor(drawn.means))
     network = trainer.train(training_batch_size=BATCH, learning_rate=RATE, stop_after_epochs=PATIENCE)
     return network.eval()
 
@@ -179,7 +189,7 @@ def _posterior(network: CategoricalMassEstimator, means: np.ndarray, count: int)
 
     numbers = torch.arange(count, dtype=torch.float32)[:, None]
     with torch.no_grad():
-        logs = network.log_prob(numbers, _tensor(np.tile(means, (count, 1))))
+        logs = network.log_prob(numbers, tensor(np.tile(means, (count, 1))))
     return np.asarray(softmax(logs.numpy().astype(float).ravel()))
 
 
@@ -202,7 +212,7 @@ def _distance(
     from sbi.diagnostics.misspecification import calc_misspecification_mmd
 
     with torch.no_grad():
-        one, others = (network.net.embedding_net(_tensor(means)) for means in (seen, references))
+        one, others = (network.net.embedding_net(tensor(means)) for means in (seen, references))
         # these are summaries already; sbi finds none itself in a network of discrete parameters
         _, (null, distance) = calc_misspecification_mmd(
             one, others, mode="x_space", n_shuffle=REFERENCES, max_samples=REFERENCES
@@ -212,7 +222,8 @@ def _distance(
     return (float(distance) - centre) / scale, (limit - centre) / scale
 
 
-def _tensor(values: np.ndarray) -> Tensor:
+def tensor(values: np.ndarray) -> Tensor:
+    """Convert an array to single precision."""
     import torch
 
     return torch.as_tensor(values, dtype=torch.float32)

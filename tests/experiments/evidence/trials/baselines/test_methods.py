@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.special import logsumexp
 from synthetic_world import CONDITIONS, OBSERVABLES, SETTINGS, emulator, measure
 
 from doe.discrepancy.fitting.model_fit import weigh
 from doe.errors import RuleError
 from experiments.evidence.trials.baselines.method_list import ALONE, installed, methods
-from experiments.evidence.trials.baselines.methods import inference, lisdd
+from experiments.evidence.trials.baselines.methods import inference, lisdd, sbmi
 from experiments.evidence.trials.baselines.methods.contest import judged, prior_of_one
 from experiments.evidence.trials.baselines.methods.model_evidence import log_evidence, smc
 from experiments.evidence.trials.baselines.protocol import Answer, Problem
@@ -21,8 +22,8 @@ from experiments.io.errors import InputError
 KNOWN = emulator().without("delta", "epsilon", "zeta", "twin")
 REFUSING = ("Bayes factors", "BIC", "boosted trees")
 NAMING = (*REFUSING, "LISDD")
-SBI = pytest.param("sbi", marks=pytest.mark.library("sbi"))
-EVERY = [SBI if name == "sbi" else name for name in methods(None)]
+SBI, SBMI = (pytest.param(name, marks=pytest.mark.library("sbi")) for name in ("sbi", "SBMI"))
+EVERY = [{"sbi": SBI, "SBMI": SBMI}.get(name, name) for name in methods(None)]
 
 
 @pytest.fixture(autouse=True)
@@ -52,7 +53,7 @@ def test_no_method_raises_an_alarm_where_nothing_is_hidden(name: str, nothing: P
     assert answer.named == ()
 
 
-@pytest.mark.parametrize("name", [*NAMING, ALONE, SBI])
+@pytest.mark.parametrize("name", [*NAMING, ALONE, SBI, SBMI])
 def test_a_strong_effect_is_named(name: str, strong: Problem) -> None:
     answer = methods(None)[name](strong)
     assert answer.alarm
@@ -163,6 +164,37 @@ def test_draws_of_a_network_are_of_every_model_by_its_prior(
     shares = np.bincount(drawn.model) / len(drawn.model)
     np.testing.assert_allclose(shares, [1 / 2, *[1 / 12] * 6], atol=1e-3)
     assert drawn.means.shape == (len(drawn.model), len(nothing.stack(()).target))
+    # two factors, and the sizes of those mechanisms alone that a model has
+    sizes = np.isfinite(drawn.parameters[:, -3:])
+    assert np.isfinite(drawn.parameters[:, :-3]).all()
+    np.testing.assert_array_equal(sizes.sum(axis=1), np.array([0, 1, 1, 1, 2, 2, 2])[drawn.model])
+
+
+@pytest.mark.library("sbi")
+def test_grassmann_distributions_sum_to_one_over_all_binary_vectors() -> None:
+    raw = np.random.default_rng(5).normal(0.0, 2.0, sbmi.MIXED * (1 + 2 * 4**2))
+    every = np.array(list(np.ndindex(2, 2, 2, 2)), dtype=float)
+    logs = sbmi.grassmann(inference.tensor(np.tile(raw, (16, 1))), inference.tensor(every))
+    # single precision: 1e-7 each, 16 determinants of 4 by 4
+    assert float(logs.exp().sum()) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.library("sbi")
+def test_a_mixture_of_gaussians_leaves_out_the_parameters_that_a_model_lacks() -> None:
+    rng, size = np.random.default_rng(6), 3
+    raw = rng.standard_normal(sbmi.MIXED * (1 + size + size**2))
+    logits, means, elements = np.split(raw, [sbmi.MIXED, sbmi.MIXED * (1 + size)])
+    at = np.array([[0.3, np.nan, -0.8]])
+    found = float(sbmi.gaussians(inference.tensor(raw[None]), inference.tensor(at))[0])
+    factors = elements.reshape(-1, size, size)
+    lower = np.tril(factors, -1) + np.array([np.diag(np.log1p(np.exp(np.diag(each)))) for each in factors])
+    known = [0, 2]
+    logs = [
+        stats.multivariate_normal(mean[known], (each @ each.T)[np.ix_(known, known)]).logpdf(at[0, known])
+        for mean, each in zip(means.reshape(-1, size), lower, strict=True)
+    ]
+    # single precision, and the least standard deviation of 1e-4 that the network adds
+    assert found == pytest.approx(logsumexp(logits - logsumexp(logits) + logs), abs=2e-3)
 
 
 def test_all_single_mechanisms_have_the_prior_of_all_pairs() -> None:
@@ -175,7 +207,7 @@ def test_without_sbi_the_message_says_what_to_install_and_the_others_go_on(
     monkeypatch.setattr(inference, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=re.escape("pip install 'dem-warp[sbi]'")):
         methods(None)["sbi"](nothing)
-    assert list(installed(methods(None))) == [name for name in methods(None) if name != "sbi"]
+    assert list(installed(methods(None))) == [name for name in methods(None) if name not in ("sbi", "SBMI")]
 
 
 def test_models_that_share_the_weight_are_a_tie_and_what_most_have_is_named(strong: Problem) -> None:
