@@ -80,7 +80,7 @@ class Problem:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What trials have alike that share what was learned: bank, library and number of means."""
+        """Library, bank and number of means: trials that have them alike share what was learned."""
         stack = self.stack(())
         center = stack.model.predict(np.zeros((1, len(stack.model.lower))), stack.blocks[0].condition)
         return self.emulator.space.names, float(center.sum()), len(stack.target)

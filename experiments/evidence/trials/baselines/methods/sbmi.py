@@ -152,9 +152,9 @@ def grassmann(raw: Tensor, present: Tensor) -> Tensor:
 
     draws, size = present.shape
     both = raw[:, MIXED:].view(draws, 2, MIXED, size, size)
-    beside = both * (1.0 - torch.eye(size))
-    own = beside.abs().sum(-1) + both.diagonal(dim1=-2, dim2=-1).relu() + FLOOR
-    first, second = (beside + torch.diag_embed(own)).unbind(1)
+    off = both * (1.0 - torch.eye(size))
+    own = off.abs().sum(-1) + both.diagonal(dim1=-2, dim2=-1).relu() + FLOOR
+    first, second = (off + torch.diag_embed(own)).unbind(1)
     sigma = torch.linalg.solve(first + second, second, left=False)
     signed = sigma * (2.0 * present - 1.0)[:, None, None] + torch.diag_embed(1.0 - present)[:, None]
     logs = torch.linalg.det(signed).clamp_min(1e-12).log()
