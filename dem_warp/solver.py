@@ -46,7 +46,10 @@ grain shorten a step."""
 MOST_LANES = 16
 
 SEARCH_THREADS = 4 * FULL_DEVICE_THREADS
-"""Threads of a search, which needs fewer registers than a step."""
+"""Least threads of a search, which needs fewer registers than a step."""
+
+SEARCH_LANES = 1
+"""Threads of a search for each sphere of large worlds."""
 
 ANY_PACE = 1.0e9
 """Speed above that of any grain [m/s]: with it every entry of a list is a candidate."""
@@ -174,7 +177,9 @@ class Solver:
         self._launch(cells.open_buckets, self._whole_warps(spheres), [self.model, self.stale, self.cells])
         filled = [self.model, grains, self.stale, near, self.cells]
         self._launch(cells.fill_buckets, self._whole_warps(spheres), filled)
-        threads = min(spheres * WARP, SEARCH_THREADS) if self.device.is_cuda else spheres
+        threads = spheres
+        if self.device.is_cuda:
+            threads = min(WARP * spheres, max(SEARCH_THREADS, SEARCH_LANES * self._whole_warps(spheres)))
         self._launch(cells.search, threads, [threads, *filled])
         threads = self.layout.grain_total * list_threads(self.build)
         written = [self.model, grains, self.stale, self.cells, self.neighbours, self.flags]
