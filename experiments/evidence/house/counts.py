@@ -227,7 +227,7 @@ def counts() -> list[Count]:
             sum(circles_broken(pairs)[1] for pairs in (statistics, pictures)),
             0,
         ),
-        Count("installed, lines", lines(name for name in installed() if name.endswith(".py")), 68_889),
+        Count("installed, lines", lines(name for name in installed() if name.endswith(".py")), 68_894),
         Count("wheel [MB]", wheel_megabytes(), 1.5),
         Count("tests, lines", lines(python_files("tests/")), 39_961),
         Count("tracked data [MB]", megabytes(data), 16.0),
