@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from experiments.export.hopper_text import FILLED_FILE
 from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift, disc, prism, stl_text
 from experiments.export.lift_rows import end_rows, filling_rows
-from experiments.export.liggghts_hopper import FILLED_FILE
 
 TURNED_FILE = "turned.dump"
 """Dump of the turning drum, with a frame for each look."""

@@ -8,12 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from dem_warp import Drum, LiftedCylinder
+from dem_warp import Drum, Hopper, LiftedCylinder
 from experiments.export import lammps_text as text
 from experiments.export.code_table import CodeTest, code_exporter, code_laws
 from experiments.export.contact import Contact, values
 from experiments.export.drum import TURNED_FILE, drum_rows, lammps_drum, lammps_turning
 from experiments.export.exporter import Translation
+from experiments.export.hopper_text import DISCHARGE_FILE, HOPPER, WEIGHED
+from experiments.export.lammps_hopper import hopper_opening, hopper_rows, hopper_walls
 from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift, Template
 from experiments.export.lift_rows import lift_rows, lift_warnings
@@ -37,7 +39,10 @@ fix tube all wall/gran/region granular {words} region tube
 _PLATE = """\
 region plate cylinder z 0 0 {radius:.9g} {middle:.9g} 0 side out
 fix plate all wall/gran/region granular {words} region plate
-# what falls off it is taken out whole: LAMMPS ends where a part of a body leaves the box
+"""
+
+_FALLEN = """\
+# what falls off is taken out whole: LAMMPS ends where a part of a body leaves the box
 region fallen block INF INF INF INF INF {bottom:.6g}
 fix fallen all evaporate {look} {count} fallen {seed}{whole}
 """
@@ -112,8 +117,10 @@ def granular_words(contact: Contact, words: Mapping[str, str], surface_energy: f
 
 
 def translate(test: CodeTest) -> Translation:
-    """Write the input of a lifted cylinder or a drum, and its molecules."""
+    """Write the input of a lifted cylinder, a hopper or a drum, and its molecules."""
     lift = test.lift
+    if isinstance(lift.scene, Hopper):
+        return _hopper(test)
     if isinstance(lift.scene, Drum):
         return _drum(test)
     files = {INPUT: _setup(test, *_lift_walls(test)) + _filling(lift) + _lifting(lift), **_molecules(lift)}
@@ -127,6 +134,16 @@ def translate(test: CodeTest) -> Translation:
     bodies = "`fix nve/sphere`" if lift.is_of_spheres else "`fix rigid/small`, mass and inertia given"
     translated = (*test.rows, *rows, Translated("grains", "clumps, rigid", bodies), *test.notes)
     return Translation(files, INPUT, ("lmp", "-in", INPUT), HEAP_FILE, translated, warnings)
+
+
+def _hopper(test: CodeTest) -> Translation:
+    lift = test.lift
+    bin_words, floor_words = (granular_words(contact, test.words) for contact in test.contacts[1:])
+    walls = hopper_walls(lift, bin_words, floor_words) + _fallen(lift)
+    setup = _setup(test, walls, _sides(lift, _below(lift)), WEIGHED)
+    files = {HOPPER: setup + _filling(lift) + hopper_opening(lift), **_molecules(lift)}
+    rows, warnings = (*test.rows, *hopper_rows(lift), *test.notes), test.warnings + lift_warnings(lift)
+    return Translation(files, HOPPER, ("lmp", "-in", HOPPER), DISCHARGE_FILE, rows, warnings)
 
 
 def _drum(test: CodeTest) -> Translation:
@@ -151,18 +168,28 @@ def _lift_walls(test: CodeTest) -> tuple[str, tuple[float, ...]]:
     """Return the walls of a lifted cylinder, and the sides of the box [m]."""
     lift, scene = test.lift, test.lift.scene
     with_tube, with_plate = (granular_words(contact, test.words) for contact in test.contacts[1:])
-    half_width, _, bottom = scene.room(lift.reach)
-    plate, gravity = f"fix plate all wall/gran granular {with_plate} zplane 0 NULL\n", _gravity(lift)
-    rain_top = lift.rain_bottom + lift.rain_height
-    if scene.plate_diameter is not None:
-        plate = _plate(lift, scene.plate_diameter / 2, with_plate, bottom)
-        bottom -= LOOK * math.sqrt(scene.rain_speed**2 + 2.0 * gravity * rain_top) + lift.reach
-    sides = (-half_width, half_width, -half_width, half_width, bottom, rain_top + 2.0 * lift.reach)
     tube = _TUBE.format(radius=scene.diameter / 2, height=scene.height, words=with_tube)
-    return tube + plate, sides
+    bottom = scene.room(lift.reach)[2]
+    if scene.plate_diameter is None:
+        plane = f"fix plate all wall/gran granular {with_plate} zplane 0 NULL\n"
+        return tube + plane, _sides(lift, bottom)
+    plate = _PLATE.format(radius=scene.plate_diameter / 2, middle=bottom / 2, words=with_plate)
+    return tube + plate + _fallen(lift), _sides(lift, _below(lift))
 
 
-def _setup(test: CodeTest, walls: str, sides: Sequence[float]) -> str:
+def _sides(lift: Lift, bottom: float) -> tuple[float, ...]:
+    half_width, top = lift.scene.room(lift.reach)[0], lift.rain_bottom + lift.rain_height
+    return -half_width, half_width, -half_width, half_width, bottom, top + 2.0 * lift.reach
+
+
+def _below(lift: Lift) -> float:
+    """Return the height that no grain falls to between two looks at what is to be taken out [m]."""
+    fall = 2.0 * _gravity(lift) * (lift.rain_bottom + lift.rain_height)
+    way = LOOK * math.sqrt(lift.scene.rain_speed**2 + fall)
+    return float(lift.scene.room(lift.reach)[2]) - way - lift.reach
+
+
+def _setup(test: CodeTest, walls: str, sides: Sequence[float], watch: str = "") -> str:
     lift, among = test.lift, granular_words(test.contacts[0], test.words)
     names = " ".join(text.molecule_file(n) for n in range(1, len(lift.templates) + 1))
     upright = (0.0, 0.0, -_gravity(lift))
@@ -183,17 +210,14 @@ def _setup(test: CodeTest, walls: str, sides: Sequence[float]) -> str:
         if spheres
         else text.BODY_NUMBERS + text.rigid_bodies(upright),
         _rain(lift, lift.rain_bottom + lift.rain_height),
-        watched(lift),
+        watched(lift, more=watch),
     ]
     return "".join(parts)
 
 
-def _plate(lift: Lift, radius: float, words: str, bottom: float) -> str:
-    return _PLATE.format(
-        radius=radius,
-        middle=bottom / 2,
-        words=words,
-        bottom=bottom,
+def _fallen(lift: Lift) -> str:
+    return _FALLEN.format(
+        bottom=lift.scene.room(lift.reach)[2],
         look=lift.steps(LOOK),
         count=lift.count,
         seed=lift.seeds(2)[1],
@@ -295,7 +319,7 @@ def tsuji_restitution(damping: float) -> float:
     return float(brentq(above, *ends))
 
 
-LAMMPS = code_exporter("lammps", translate, contact_numbers, (LiftedCylinder, Drum))
+LAMMPS = code_exporter("lammps", translate, contact_numbers, (LiftedCylinder, Hopper, Drum))
 
 CONVENTIONS = code_laws("lammps")
 """Contact laws that it has."""

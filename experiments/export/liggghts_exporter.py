@@ -15,13 +15,11 @@ from experiments.export.drum import (
     liggghts_turning,
 )
 from experiments.export.exporter import Translation
+from experiments.export.hopper_text import DISCHARGE_FILE, HOPPER, WEIGHED, bin_top
 from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift, disc, prism, stl_text
 from experiments.export.lift_rows import lift_rows, lift_warnings
 from experiments.export.liggghts_hopper import (
-    DISCHARGE_FILE,
-    WEIGHED,
-    bin_top,
     hopper_meshes,
     hopper_opening,
     hopper_room,
@@ -78,13 +76,13 @@ def translate(test: CodeTest) -> Translation:
 
 
 def _hopper(test: CodeTest) -> Translation:
-    lift, model, input = test.lift, text.model_words(test.words), "hopper.in"
+    lift, model = test.lift, text.model_words(test.words)
     walls = hopper_walls(lift, model)
     setup = _setup(test, model, ("grains", "bin", "floor"), hopper_room(lift), bin_top(lift), walls)
     parts = [setup, watched(lift, more=WEIGHED), *_filling(lift), hopper_opening(lift, _QUIT)]
-    files = {input: "".join(parts)} | hopper_meshes(lift)
+    files = {HOPPER: "".join(parts)} | hopper_meshes(lift)
     rows, warnings = (*test.rows, *hopper_rows(lift)), test.warnings + lift_warnings(lift)
-    return Translation(files, input, ("liggghts", "-in", input), DISCHARGE_FILE, rows, warnings)
+    return Translation(files, HOPPER, ("liggghts", "-in", HOPPER), DISCHARGE_FILE, rows, warnings)
 
 
 def _drum(test: CodeTest) -> Translation:

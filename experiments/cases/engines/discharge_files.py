@@ -13,7 +13,7 @@ from dem_warp.scenes.discharge import DischargeState
 from dem_warp.scenes.surfaces import bed_level
 from experiments.cases.engines.contract import heap_result, read_heap
 from experiments.cases.engines.program import AnswerError, empty_result
-from experiments.export.liggghts_hopper import DISCHARGE_FILE, FILLED_FILE, volume_share
+from experiments.export.hopper_text import DISCHARGE_FILE, FILLED_FILE, volume_share
 from experiments.io.texts import read_text
 
 

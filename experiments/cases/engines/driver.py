@@ -17,7 +17,7 @@ from experiments.cases.engines.contract import heap_result, read_heap
 from experiments.cases.engines.discharge_files import discharge_result
 from experiments.cases.engines.drum_files import drum_result
 from experiments.export import EXPORTERS, ExportedTest, Translation, export_input
-from experiments.export.liggghts_hopper import FILLED_FILE
+from experiments.export.hopper_text import FILLED_FILE
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
 

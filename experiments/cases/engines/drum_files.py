@@ -18,7 +18,7 @@ from dem_warp.view import WorldView
 from experiments.cases.engines.contract import grains_of, heap_result
 from experiments.cases.engines.program import AnswerError, empty_result
 from experiments.export.drum import TURNED_FILE
-from experiments.export.liggghts_hopper import FILLED_FILE
+from experiments.export.hopper_text import FILLED_FILE
 from experiments.grains.spheres.lammps_dump import read_looks
 from experiments.io.errors import InputError
 

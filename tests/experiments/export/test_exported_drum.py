@@ -15,8 +15,8 @@ from experiments.cases.engines.driver import Driver
 from experiments.cases.engines.program import AnswerError, ProgramEngine
 from experiments.export import ExportedTest, export_input
 from experiments.export.drum import TURNED_FILE, drum_meshes
+from experiments.export.hopper_text import FILLED_FILE
 from experiments.export.lift import Lift
-from experiments.export.liggghts_hopper import FILLED_FILE
 from experiments.io.errors import InputError
 
 CODES = [pytest.param(code, marks=pytest.mark.program(program)) for code, program in
