@@ -86,7 +86,8 @@ class ReposeAngle:
         """Doubts about the angle; empty for a drawn silhouette."""
         if not self.outline.photographed:
             return ()
-        found = doubts_of(self.left_line, self.right_line, self.mean, self._lines_se, self.outline)
+        lines = self.left_line, self.right_line
+        found = doubts_of(*lines, self.mean, self._lines_se, self.outline, whole=self.se)
         known = {doubt.name for doubt in self.outline.doubts}  # a tilt without a plate has a lower limit
         return (*self.outline.doubts, *(doubt for doubt in found if doubt.name not in known))
 

@@ -48,7 +48,7 @@ def export(
     """
     with clear_errors():
         from experiments.cases import require_unused
-        from experiments.commands.leaving import exported_test, study_of, with_bridge_warning
+        from experiments.commands.leaving import exported_test, study_of, with_card_warnings
         from experiments.export import export_input, write_export
         from experiments.io.files import require_folder
         from experiments.runs.choices import default_folder
@@ -57,7 +57,7 @@ def export(
         study = study_of(source, scale)
         values = study.natural_settings(assignments(settings or []), "--set")
         test = exported_test(study, values, seed, scene or TARGET_SCENE)
-        translation = with_bridge_warning(export_input(test, to, approximate), study, to)
+        translation = with_card_warnings(export_input(test, to, approximate), study, to)
         folder = out or default_folder(study, to)
         require_unused(folder)
         require_folder(folder)

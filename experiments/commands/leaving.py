@@ -7,9 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from experiments.export import ExportedTest, Translation
+from experiments.io.texts import enumeration
 from experiments.studyfile import Study, load_card, load_study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.card import is_card
+from experiments.studyfile.solver_section import UNNAMED
+
+SAID = {
+    "solver": f"contact laws ([material.solver]; {UNNAMED!r} is taken)",
+    "numerics": "modulus scale and time step ([fitted.numerics])",
+    "measurement": "reading of a heap ([fitted.measurement])",
+}
+"""Sections of a card that change what its values mean."""
 
 
 def study_of(path: Path | None, scale: str | None) -> Study:
@@ -25,13 +34,15 @@ def study_of(path: Path | None, scale: str | None) -> Study:
     return load_study(path, scale)
 
 
-def with_bridge_warning(translation: Translation, study: Study, to: str) -> Translation:
-    """Add a warning if a bridge has corrected the values for another code."""
-    engine = study.solver.corrected_for
-    if engine in (None, to):
-        return translation
-    warning = f"the card was corrected for {engine} by a bridge: its values hold there alone"
-    return replace(translation, warnings=(*translation.warnings, warning))
+def with_card_warnings(translation: Translation, study: Study, to: str) -> Translation:
+    """Add a warning if a bridge has corrected the values for another code, or a card lacks sections."""
+    warnings = list(translation.warnings)
+    if study.solver.corrected_for not in (None, to):
+        engine = study.solver.corrected_for
+        warnings.append(f"the card was corrected for {engine} by a bridge: its values hold there alone")
+    if is_card(study.file) and (missing := [SAID[name] for name in SAID if name not in study.document]):
+        warnings.append(f"the card lacks its {enumeration(missing)}: defaults are taken, perhaps not its own")
+    return replace(translation, warnings=tuple(warnings))
 
 
 def exported_test(

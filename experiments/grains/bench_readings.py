@@ -223,9 +223,7 @@ def read_columns(path: Path, method: str) -> dict[str, list[Quantity]]:
     known = [name for formula in METHODS[method] for name in formula.quantities]
     header = UnitHeader(lambda name, unit: name.lower() if name.lower() in known else "")
     rows = list(read_rows(path, (), known, header))
-    needed = next(
-        (f.quantities for f in METHODS[method] if rows and set(f.quantities) <= set(rows[0].cells)), None
-    )
+    needed = next((f.quantities for f in METHODS[method] if set(f.quantities) <= set(rows[0].cells)), None)
     if needed is None:
         ways = ", or ".join(" and ".join(formula.quantities) for formula in METHODS[method])
         raise InputError(str(path), f"needs rows below the columns {ways}")

@@ -50,9 +50,10 @@ def read_rows(
     returns known names and empty ones for columns to ignore, it is the first row with all needed columns.
     A line of one cell above a row of several names is a title.
     Raise InputError when the file cannot be read, its columns are not these, or a row has more cells than
-    columns.
+    columns; or without a row.
     """
     header: list[str] = []
+    filled = False
     lines = list(_lines(path, numbered=renamed is not None))
     names = [cell for cell in lines[1][1] if cell and not is_number(cell)] if len(lines) > 1 else []
     if sum(map(bool, lines[0][1] if lines else [])) == 1 < len(names):
@@ -64,13 +65,16 @@ def read_rows(
             continue
         if not header:
             header = found or cells
-            _check_header(path, line, header, needed, known)
+            _check_header(f"{path}:{line}", cells, header, needed, known)
         elif any(cells[len(header) :]):
             problem = f"must have a cell for each of the {len(header)} columns, and no more"
             hint = "Put quotes around a text with a comma."
             raise InputError(f"{path}:{line}", problem, f"{len(cells)} cells", hint)
         else:
+            filled = True
             yield Row(path, line, dict(zip(header, cells, strict=False)))
+    if not filled:
+        raise InputError(str(path), "has no rows below the names of the columns")
 
 
 def _lines(path: Path, numbered: bool) -> Iterator[tuple[int, list[str]]]:
@@ -78,8 +82,11 @@ def _lines(path: Path, numbered: bool) -> Iterator[tuple[int, list[str]]]:
 
     With `numbered` a first cell as ``#40``, the number of a sieve, begins no comment.
     """
-    delimiter, rows = _read(path)
+    delimiter, found = _read(path)
     try:
+        rows = list(found)
+        if delimiter != ",":
+            _check_marks(path, {cell.strip() for _, row in rows for cell in row})
         for line, row in rows:
             cells = [cell.strip() for cell in row]
             if delimiter != ",":
@@ -101,6 +108,14 @@ def _read(path: Path) -> tuple[str, Iterator[tuple[int, list[str]]]]:
     return delimiter, ((reader.line_num, row) for row in reader)
 
 
+def _check_marks(path: Path, cells: Collection[str]) -> None:
+    """Refuse a mark before three digits, as of thousands, where the other one is a decimal mark."""
+    for mark, decimal in (".,", ",."):
+        found = next((each for each in cells if re.fullmatch(rf"[1-9]\d{{0,2}}\{mark}\d{{3}}", each)), "")
+        if found and any(re.fullmatch(rf"[+-]?\d+\{decimal}\d+", each) for each in cells):
+            raise InputError(str(path), "may have marks of thousands: write numbers without them", found)
+
+
 def _delimiter(text: str) -> str:
     """Separator of the first row of cells: a semicolon, a tab, or a comma."""
     lines = (line.strip() for line in text.splitlines())
@@ -109,9 +124,8 @@ def _delimiter(text: str) -> str:
 
 
 def _check_header(
-    path: Path, line: int, header: list[str], needed: Collection[str], known: Collection[str]
+    place: str, cells: list[str], header: list[str], needed: Collection[str], known: Collection[str]
 ) -> None:
-    place = f"{path}:{line}"
     if missing := [name for name in needed if name not in header]:
         problem = f"the first row must name the columns; missing: {', '.join(missing)}"
         raise InputError(place, problem, ", ".join(header))
@@ -119,4 +133,5 @@ def _check_header(
         if name and name not in known:
             raise InputError(place, f"must be a known column, {nearest_name(name, list(known))}", name)
         if name and header.count(name) > 1:
-            raise InputError(place, "names a column twice", name)
+            twice = ", ".join(cell for cell, own in zip(cells, header, strict=True) if own == name)
+            raise InputError(place, f"must have one column {name}", twice, "Rename the others.")

@@ -27,7 +27,7 @@ from imaging import (
     overlay,
     snapshot,
 )
-from imaging.drawing.ground import REST, find_ground, height_is_along_y
+from imaging.drawing.ground import REST, find_ground, height_axis, seen_upright
 from imaging.geometry import Picture, Spheres
 from imaging.photo.doubts import ROUGH_EDGE, doubts_of_mean
 
@@ -125,10 +125,10 @@ def _measured(
         raise InputError(f"{path}, --unit", problem, f"{settings.unit:g} m")
     size = settings.unit or file.unit or length_unit(DEFAULT_UNIT)
     spheres = Spheres.of(file.spheres[:, :3] * size, file.spheres[:, 3] * size)
-    if along_y := height_is_along_y(spheres):
-        x, y, z = spheres.centers.T
-        spheres = Spheres(np.column_stack([x, -z, y]), spheres.radii)
-    height = find_ground(spheres) if settings.plate_height is None else settings.plate_height
+    spheres = seen_upright(spheres, axis := height_axis(spheres))
+    up = -1.0 if axis.startswith("-") else 1.0
+    given = None if settings.plate_height is None else up * settings.plate_height
+    height = find_ground(spheres) if given is None else given
     standing = spheres.centers[:, 2] > height - BELOW * spheres.radii
     if not standing.any():
         raise InputError(f"{path}, --plate-height", "no sphere is above the plate", f"{1e3 * height:g} mm")
@@ -142,10 +142,10 @@ def _measured(
         file.description,
         f"{len(heap.radii)} spheres of {span} radius"
         + ("" if file.bodies is None else f" in {bodies} grains"),
-        f"plate {'found' if settings.plate_height is None else 'given'} at {1e3 * height:.4g} mm",
+        f"plate {'found' if given is None else 'given'} at {1e3 * up * height:.4g} mm",
     ]
-    if along_y:
-        parts.append("height seems to be along y, and is read so")
+    if axis != "z":
+        parts.append(f"height seems to be along {axis}, and is read so")
     if fallen := int(np.count_nonzero(~standing)):
         parts.append(f"{fallen} below it left out")
     doubts = _doubted_plate(spheres, height)

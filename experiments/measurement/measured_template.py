@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from dem_warp import Drum
 from experiments.io.files import require_new_file, write_text
+from experiments.io.toml_files import leaves
 from experiments.measurement.measured_file import COLUMNS
 from experiments.measurement.readings import CLOGGED_ROW
 from experiments.studyfile import Condition, Study
@@ -80,18 +80,9 @@ def write_measured_template(study: Study, folder: Path | None = None) -> Path:
 
 
 def _described(condition: Condition) -> str:
-    changes = "; ".join(f"{place} = {value}" for place, value in _flat(condition.changes))
+    changes = "; ".join(f"{place} = {value}" for place, value in leaves(condition.changes))
     held_out = " (held out: not fitted, it tests the result)" if condition.held_out else ""
     return f"    {condition.name}: {changes or 'the test as it is'}{held_out}"
-
-
-def _flat(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in table.items():
-        name = f"{place}.{key}".removeprefix(".")
-        if isinstance(value, Mapping):
-            yield from _flat(value, name)
-        else:
-            yield name, value
 
 
 def _defined(study: Study) -> Iterator[str]:

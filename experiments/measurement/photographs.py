@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -351,13 +349,7 @@ def target_text(rows: Sequence[Mapping[str, Any]], options: PictureOptions) -> s
 
 def csv_table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Write the rows as CSV; lists are joined by semicolons."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({key: _cell(value) for key, value in row.items()})
-    return text.getvalue()
+    import pandas as pd  # loads slowly
 
-
-def _cell(value: Any) -> Any:
-    return "; ".join(str(part) for part in value) if isinstance(value, list) else value
+    joined = lambda value: "; ".join(map(str, value)) if isinstance(value, list) else value  # noqa: E731
+    return pd.DataFrame(rows, dtype=object).map(joined).to_csv(index=False, lineterminator="\n")

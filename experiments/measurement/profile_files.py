@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence, Sized
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -94,11 +94,10 @@ def read_force_curves(path: Path, depth: float) -> Profiles:
     """
     found: dict[str, dict[float, float]] = {}
     for row in read_rows(path, ("replicate", "depth", "force"), ("replicate", "depth", "force")):
-        points, place = found.setdefault(_label(row), {}), _length(row, "depth")
+        points, place = found.setdefault(_label(row), {}), _number(row, "depth", "length")
         if place <= max(points, default=-math.inf):
             raise row.error("must be larger than in the row before", "depth")
         points[place] = _number(row, "force", "force")
-    _require_rows(found, path)
     given, forces, ends = Duplicates(), [], depth * np.arange(PARTS + 1) / PARTS
     for name, points in found.items():
         given.add(tuple(points.items()), name, f"replicate {name}", str(path))
@@ -129,7 +128,6 @@ def read_press_curves(path: Path, stress: float) -> Profiles:
         if not -1.0 < strain < 1.0:
             raise row.error("must be a part of the height, between -1 and 1", "strain")
         found.setdefault(_label(row), []).append([pressure, 1.0 - strain])
-    _require_rows(found, path)
     given, strains = Duplicates(), []
     for name, curve in found.items():
         given.add(tuple(map(tuple, curve)), name, f"replicate {name}", str(path))
@@ -151,7 +149,6 @@ def read_shear_points(path: Path, stress: float) -> Profiles:
         found.setdefault(_label(row), []).append(
             [_number(row, name, "pressure") for name in ("normal", "shear")]
         )
-    _require_rows(found, path)
     given = Duplicates()
     shears, spans = [], []
     for name, points in found.items():
@@ -190,7 +187,6 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
         if np.hypot(x, z) > radius:
             problem = f"must be in the drum, within {1e3 * radius:g} mm of its axis"
             raise InputError(f"{path}:{row.line}: x, z", problem, f"x {row['x']}, z {row['z']}")
-    _require_rows([*found, *pictured], path)
     places = np.array(STATIONS) * radius
     heights = pictured
     for name, each in found.items():
@@ -252,7 +248,6 @@ def read_heap_profiles(path: Path, fit: str, size: ValueLimits) -> Profiles:
     for name, views in points.items():
         heaps[name] += [_outline(view, f"{path}:{view.line}", size) for view in views.values()]
     _require_own_points(points, path)
-    _require_rows(heaps, path)
     stations = list(range(len(next(iter(heaps.values()))[0])))
     return _profiles(stations, heaps)
 
@@ -265,7 +260,7 @@ def _profiles(stations: list[int], found: Mapping[str, list[np.ndarray]]) -> Pro
 
 def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, float]:
     """Add the point of a row to those of its view, and return it."""
-    x, z = _length(row, "x"), _length(row, "z")
+    x, z = _number(row, "x", "length"), _number(row, "z", "length")
     views = found.setdefault(_label(row), {})
     view = views.setdefault(row["view"], _Points(row.line, {}))
     if x in view.heights:
@@ -277,11 +272,6 @@ def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, 
 def _require_no_point(row: Row) -> None:
     if row["x"] or row["z"]:
         raise row.error("must not be in a row with a point", "picture")
-
-
-def _require_rows(found: Sized, path: Path) -> None:
-    if not found:
-        raise InputError(str(path), "has no rows below the names of the columns")
 
 
 def _require_own_points(found: Mapping[str, Mapping[str, _Points]], path: Path) -> None:
@@ -370,14 +360,10 @@ def _pictured(row: Row, fit: str, size: ValueLimits) -> Iterator[np.ndarray]:
 
 def read_pixel(row: Row) -> float:
     """Read the size of a row's pixels [m]."""
-    pixel = _length(row, "pixel")
+    pixel = _number(row, "pixel", "length")
     if pixel <= 0.0:
         raise row.error("must be positive", "pixel")
     return pixel
-
-
-def _length(row: Row, column: str) -> float:
-    return _number(row, column, "length")
 
 
 def _number(row: Row, column: str, dimension: str) -> float:

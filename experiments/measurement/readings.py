@@ -136,8 +136,6 @@ def _written(row: Row, observable: Observable, size: ValueLimits) -> Reading:
 
 
 def _quantity(row: Row) -> Quantity:
-    if "," in row["value"]:
-        raise row.error("needs a decimal point, not a comma", "value")
     unit = "" if row["unit"] == "1" else row["unit"]
     try:
         return Quantity.parse(f"{row['value']} {unit}")

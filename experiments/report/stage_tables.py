@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from experiments.calibrate.results import (
     failed,
 )
 from experiments.export.sizes import sizes_text
+from experiments.io.toml_files import leaves
 from experiments.report.kit.numbers import open_end, unit_sign
 from experiments.report.kit.sentences import say
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
@@ -288,15 +289,6 @@ def fixed_table(study: Study, optimum: OptimumResult, case: Case[Any]) -> Table:
     rows.append({"what": "contact laws", "value": study.solver.laws.name, "note": "see what was simulated"})
     heads = columns(what="what the study fixes", value="value", note="note")
     return make_table("fixed-values", pd.DataFrame(rows), heads, "All else that the values hold with.")
-
-
-def leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the values of nested tables with their dotted places."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from leaves(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
 
 
 def _how(name: str, optimum: OptimumResult, study: Study) -> str:

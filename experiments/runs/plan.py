@@ -76,11 +76,13 @@ class Plan:
     def totals(self) -> dict[str, Any]:
         """Expected cases, the most cases, the expected wall time [s] or None, and where it comes from."""
         seconds = [batch.seconds for batch in self.batches]
-        known = None if None in seconds else float(sum(each or 0.0 for each in seconds))
+        known = None if None in seconds[:-1] or not any(seconds) else sum(each or 0.0 for each in seconds)
         cases, most = (sum(getattr(batch, name) for batch in self.batches) for name in ("cases", "most"))
         source = source_of({number for batch in self.batches[:-1] for number in batch.noted})
         if known is None:
-            source = UNKNOWN if None in seconds[:-1] else "unknown until the first such run"
+            source = UNKNOWN
+        elif seconds[-1] is None:
+            source += ", without start and report"
         return {"cases": cases, "most": most, "seconds": known, "source": source}
 
     def to_dict(self) -> dict[str, Any]:

@@ -24,24 +24,34 @@ def find_ground(spheres: Spheres) -> float:
 
     Spheres that fell off the plate, and those on other spheres, do not count.
     """
-    lowest, first, resting = _layer(spheres, 2)
+    lowest, first, resting = _layer(spheres)
     if resting < LEAST_RESTING:
         problem = f"at least {LEAST_RESTING} spheres must rest on it: give its height"
         raise PictureError("plate", problem, f"{resting} at one height")
     return float(np.median(lowest[first : first + resting]))
 
 
-def height_is_along_y(spheres: Spheres) -> bool:
-    """Return whether a plate is below the spheres along y, and none is below them along z."""
-    (lowest, below_y, resting), (_, below_z, _) = (_layer(spheres, axis) for axis in (1, 2))
-    heap = lowest[below_y:] - lowest[below_y]
-    is_skew = float(np.median(heap)) < SKEW * float(heap[-1])
-    return is_skew and resting >= LEAST_RESTING and below_y < FALLEN * len(lowest) < below_z
+def height_axis(spheres: Spheres) -> str:
+    """Return the axis of a heap's height: ``z``, or e.g. ``-x`` where there alone a plate is below it."""
+    for name in ("z", "y", "-z", "x", "-y", "-x"):
+        lowest, first, resting = _layer(seen_upright(spheres, name))
+        heap = lowest[first:] - lowest[first]
+        is_heap = name == "z" or (resting >= LEAST_RESTING and np.median(heap) < SKEW * heap[-1])
+        if is_heap and first <= FALLEN * len(lowest):
+            return name
+    return "z"
 
 
-def _layer(spheres: Spheres, axis: int) -> tuple[FloatArray, int, int]:
-    """Return the sorted lowest points along an axis, the first at the plate, and how many rest there."""
-    lowest = np.sort(spheres.centers[:, axis] - spheres.radii)
+def seen_upright(spheres: Spheres, axis: str) -> Spheres:
+    """Turn spheres so that an axis of `height_axis` is z."""
+    up = "xyz".index(axis[-1])
+    kept = np.roll(spheres.centers, 2 - up, axis=1)
+    return Spheres(kept[:, [1, 0, 2]] * [1.0, 1.0, -1.0] if axis.startswith("-") else kept, spheres.radii)
+
+
+def _layer(spheres: Spheres) -> tuple[FloatArray, int, int]:
+    """Return the sorted lowest points, the first at the plate, and how many rest there."""
+    lowest = np.sort(spheres.centers[:, 2] - spheres.radii)
     layer = REST * float(np.median(spheres.radii))
     resting = np.searchsorted(lowest, lowest + layer, side="right") - np.arange(len(lowest))
     first = int(np.argmax(resting))

@@ -55,10 +55,10 @@ LARGEST_SHIFT = 1.0
 """Change of the mean with the threshold [degrees]: that of an edge is small, that of a shadow is not."""
 
 
-def doubts_of_mean(mean: float, se: float, largest_error: float) -> Iterator[Doubt]:
-    """Doubt a large standard error, and an angle that dry grains do not have."""
+def doubts_of_mean(mean: float, se: float, largest_error: float, whole: float = 0.0) -> Iterator[Doubt]:
+    """Doubt a large standard error, the `whole` of which may have more parts, and an unusual angle."""
     if se > largest_error:
-        yield Doubt("error", f"a standard error of {se:.2f} degrees, over {largest_error:g}")
+        yield Doubt("error", f"a standard error of {whole or se:.2f} degrees, over {largest_error:g}")
     if not 5.0 <= mean <= 60.0:
         yield Doubt("range", f"{mean:.1f} degrees, outside 5 to 60")
 
@@ -70,12 +70,13 @@ def doubts_of(
     se: float,
     outline: Outline,
     largest_error: float = LARGEST_ERROR,
+    whole: float = 0.0,
 ) -> Iterator[Doubt]:
-    """Apply the rules to an angle with its standard error; the outline's own doubts are not repeated."""
+    """Apply the rules to an angle with its lines' standard error; the outline's own are not repeated."""
     lean = abs(left.angle - right.angle)
     if lean > LARGEST_LEAN:
         yield Doubt("lean", f"left and right are {lean:.1f} degrees apart, over {LARGEST_LEAN:g}")
-    yield from doubts_of_mean(mean, se, largest_error)
+    yield from doubts_of_mean(mean, se, largest_error, whole)
     if abs(outline.plate.tilt) > LARGEST_TILT:
         yield Doubt("tilt", f"{outline.plate.tilt:.1f} degrees, over {LARGEST_TILT:g}")
     if outline.elevation > LARGEST_ELEVATION:

@@ -1,4 +1,4 @@
-"""Forty files as people bring them, each with its answer: the right number, or a message with the fault.
+"""Files as people bring them, each with its answer: the right number, or a message with the fault.
 
 Those with a source are made after a public report of somebody's trouble, in our own words and numbers.
 """
@@ -219,6 +219,11 @@ CASES: Mapping[str, Brought] = {
         lambda: dump("x y z radius", np.array([[0.0, 0.0, np.nan, 2e-3]]), BOUNDS),
         ("a.dump, line 10", "four finite numbers"),
     ),
+    "points of a scanner": Brought(
+        "a.pcd",
+        lambda: f"# .PCD v0.7\nVERSION 0.7\nFIELDS x y z radius\nPOINTS 9\nDATA ascii\n{'0 0 1 1' * 9}",
+        ("is a PCD file", "table of x, y, z, radius"),
+    ),
     "no sphere": Brought("a.dump", lambda: dump("x y z radius", np.empty((0, 4)), BOUNDS), ("no spheres",)),
     # meshes
     "triangles that look inward": Brought("a.stl", turned_over, command=CLUMP, source="wolph/numpy-stl#186"),
@@ -250,6 +255,9 @@ CASES: Mapping[str, Brought] = {
         ("inner walls", "Remove them"),
         CLUMP,
         "mikedh/trimesh#122",
+    ),
+    "decimal commas": Brought(
+        "a.stl", lambda: stl(TRIANGLES + 0.5).replace(".5", ",5"), ("decimal comma",), CLUMP
     ),
     "inside out": Brought("a.stl", lambda: stl(TRIANGLES[:, ::-1]), command=CLUMP),
     "two boxes through one another": Brought(

@@ -1,6 +1,7 @@
 """Doubts about an angle, by outlines whose heap and board are known."""
 
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,3 +99,14 @@ def test_a_ragged_heap_of_few_grains_is_not_said_to_have_a_board_or_a_shadow() -
             found += [str(each) for each in measure(picture).doubts if "as steep as" in each.finding]
     assert len(found) > 3
     assert all("few grains" in finding and "board" not in finding for finding in found)
+
+
+def test_a_doubt_about_the_error_prints_the_error_of_the_table() -> None:
+    clean = outline(0.0)
+    rough = clean.height + np.random.default_rng(4).normal(0.0, 9.0, len(clean.height))
+    angle = measure(replace(clean, height=rough, elevation=10.0))
+    # a camera from above adds to the error of the lines, .80 degrees
+    assert [str(doubt) for doubt in angle.doubts] == [
+        f"error: a standard error of {angle.se:.2f} degrees, over 0.75"
+    ]
+    assert angle.se > 1.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import statistics
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem_warp import Case
+from dem_warp.cores import cores
 from experiments.cases.forecast.work import Work, work_of
 from experiments.io.files import read_file, write_text
 
@@ -36,6 +38,9 @@ LARGE = 1000.0
 
 NEAR_STEP, NEAR_SIZE, LATEST = 1.5, 2.0, 9
 """Ratio of time steps and of spheres up to which a noted batch counts, and how many of the latest do."""
+
+_CPU = re.compile(r"(.*, CPU, )(\d+) workers?")
+"""Name of a machine's CPU with its number of workers."""
 
 UNKNOWN = "unknown until the first batch"
 """Forecast of a machine on which no like batch has finished."""
@@ -76,7 +81,13 @@ class Load:
         """Tell that another batch runs at much the same speed."""
         step, size = self.time_step / other.time_step, self.spheres / other.spheres
         near = 1.0 / NEAR_STEP <= step <= NEAR_STEP and 1.0 / NEAR_SIZE <= size <= NEAR_SIZE
-        return near and (self.machine, self.kind) == (other.machine, other.kind)
+        return near and (_host(self.machine), self.kind) == (_host(other.machine), other.kind)
+
+
+def _host(machine: str) -> str:
+    """Return the name of a machine without its number of workers on a CPU, if each has a core."""
+    found = _CPU.fullmatch(machine)
+    return found[1] if found and int(found[2]) <= cores() else machine
 
 
 def _notes() -> Path:
@@ -115,11 +126,10 @@ def note_batch(cases: Sequence[Case[Any] | Work], workers: Workers, part: float,
 
 def noted_speed(machine: str, like: Load | None = None) -> tuple[float, tuple[int, ...]] | None:
     """Return the median speed of a worker [sphere-steps/s], in like batches or in large ones; number them."""
-    speeds = {
-        number: speed
-        for number, (load, speed) in enumerate(noted_batches())
-        if load.machine.startswith(machine) and (load.is_like(like) if like else load.spheres >= LARGE)
-    }
+    batches = [(n, *one) for n, one in enumerate(noted_batches())]
+    found = [one for one in batches if (one[1].is_like(like) if like else one[1].spheres >= LARGE)]
+    own = {n: speed for n, load, speed in found if load.machine.startswith(machine)}
+    speeds = own or {n: speed for n, _, speed in found if like}
     return (statistics.median([*speeds.values()][-LATEST:]), tuple(speeds)) if speeds else None
 
 

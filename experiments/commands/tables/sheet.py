@@ -125,14 +125,15 @@ def read_mixture(path: Path, responses: Sequence[str]) -> tuple[Mixture, pd.Seri
 def read_frame(path: Path) -> tuple[pd.DataFrame, list[Row]]:
     """Return a table's cells as texts, and its rows with their places."""
     rows = list(read_rows(path, (), _Any()))
-    if not rows:
-        raise InputError(str(path), "has no row below its header")
     return pd.DataFrame([{n: row[n] for n in rows[0].cells if n} for row in rows]), rows
 
 
 def _known(path: Path, frame: pd.DataFrame, name: str) -> str:
     """Return the column of a name, which may leave out the unit of its head."""
-    found = [head for head in frame.columns if name in (head, _split_head(head)[0])]
+    found = [head for head in frame.columns if name == head]
+    found = found or [head for head in frame.columns if name == _split_head(head)[0]]
+    if len(found) > 1:
+        raise InputError(str(path), f"has several columns {name!r}: name one with its unit", ", ".join(found))
     if not found:
         raise InputError(str(path), f"has no column {name!r}; {nearest_name(name, list(frame.columns))}")
     return str(found[0])
@@ -160,6 +161,8 @@ def _labels(path: Path, frame: pd.DataFrame, run: str | None) -> pd.Index:
 def _numbers(frame: pd.DataFrame, name: str, places: Sequence[Row]) -> pd.Series:
     """Return a column's numbers; NaN for an empty cell."""
     for row in places:
+        if re.fullmatch(r"[+-]?[1-9]\d{0,2}(,\d{3})+", row[name]):
+            raise row.error("may be thousands or a decimal number: write it without a comma", name)
         if row[name] and not is_number(row[name]):
             raise row.error("must be a number, or empty", name)
     return frame[name].map(lambda cell: number(cell) if cell else np.nan).astype(float)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dem_warp import ClumpShape
-from dem_warp.clump_fitting import ClumpFit, fit_clump
+from dem_warp.clump_fitting import ClumpFit
 from dem_warp.solids import parse_solid
 from experiments.grains.clumps.clump_picture import draw_clump
-from experiments.grains.clumps.clump_search import Trial, fit_by_volume, fit_within
+from experiments.grains.clumps.clump_search import Trial, fit_with, fit_within
 from experiments.grains.clumps.mesh_file import read_surface
 from experiments.grains.spheres import format_of, length_unit, read_clump
 from experiments.grains.spheres.clump_file import GRAIN_SIZES, check_grain_size, unit_option
@@ -138,11 +138,7 @@ def _fitted(
 ) -> tuple[ClumpFit, list[Trial]]:
     if request.tolerance is not None:
         return fit_within(solid, request.tolerance, request.protrusion, watch)
-    count, reach = request.sphere_count or 1, request.protrusion
-    if reach is None:
-        fit, reach = fit_by_volume(solid, count)
-    else:
-        fit = fit_clump(solid, count, reach)
+    fit, reach = fit_with(solid, request.sphere_count or 1, request.protrusion)
     return fit, [Trial.of(fit, reach)]
 
 

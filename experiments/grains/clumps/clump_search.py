@@ -57,8 +57,10 @@ class Trial:
         return max(abs(self.volume_error), self.inertia_error, self.surface_error)
 
 
-def fit_by_volume(solid: Trimesh, sphere_count: int) -> tuple[ClumpFit, float]:
-    """Fit a clump with the protrusion [m] that keeps the solid's volume, by secants; return both."""
+def fit_with(solid: Trimesh, sphere_count: int, protrusion: float | None) -> tuple[ClumpFit, float]:
+    """Fit a clump with a protrusion [m], or by secants the one that keeps the solid's volume; return both."""
+    if protrusion is not None:
+        return fit_clump(solid, sphere_count, protrusion), protrusion
     low, limit = 0.0, LARGEST_PROTRUSION * float(solid.extents.max())
     best = fit_clump(solid, sphere_count, low), low
     error = best[0].volume_error
@@ -89,10 +91,7 @@ def fit_within(
     """
     trials: list[Trial] = []
     for count in COUNTS:
-        if protrusion is None:
-            fit, reach = fit_by_volume(solid, count)
-        else:
-            fit, reach = fit_clump(solid, count, protrusion), protrusion
+        fit, reach = fit_with(solid, count, protrusion)
         trials.append(Trial.of(fit, reach))
         watch(trials[-1])
         if trials[-1].worst <= tolerance:

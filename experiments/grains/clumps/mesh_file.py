@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -22,6 +23,9 @@ WELDED = 1e-6
 MOST_LINES = 1_000_000
 """Lines of the largest text: corners and faces of the scan of a grain are a tenth of it."""
 
+_COMMAS = re.compile(rb"^[ \t]*(?:v(?:ertex)?[ \t]+)?-?(?=\d)[^\n]*\d,\d[^\r\n]*", re.MULTILINE)
+"""Corner of a text with a decimal comma."""
+
 Corners = NDArray[np.float64]
 Faces = NDArray[np.intp]
 
@@ -39,6 +43,11 @@ def read_surface(path: Path, unit: float) -> Trimesh:
     if path.is_file():
         check_file(path, LARGEST_MESH)
         check_lines(path, MOST_LINES, "Simplify it (in MeshLab: Quadric Edge Collapse Decimation).")
+        with path.open("rb") as file:
+            head = file.read(65536)
+        if b"\0" not in head and (found := _COMMAS.search(head)):
+            hint = "Write its numbers with a decimal point."
+            raise InputError(str(path), "has numbers with a decimal comma", found[0].decode("latin-1"), hint)
     try:
         with np.errstate(invalid="ignore"):  # the centre of an empty volume
             mesh = read_mesh(path, unit)
@@ -153,7 +162,7 @@ def _crosses_itself(mesh: Trimesh) -> bool:
     from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
 
     tree, places, met = vtkStaticCellLocator(), vtkPoints(), vtkIdList()
-    tree.SetDataSet(pyvista.wrap(mesh))
+    tree.SetDataSet(pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces))
     tree.BuildLocator()
     faces, corners = [set(face) for face in mesh.faces.tolist()], np.asarray(mesh.vertices).tolist()
     for one, other in mesh.edges_unique.tolist():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -23,11 +23,11 @@ SIEVE_COLUMNS = (
 )  # fmt: skip
 COUNT_COLUMNS = ("diameter", "from", "to", "count")
 PANS = ("pan", "receiver", "tray", "bottom", "base", "fines", "boden", "pfanne", "schale", "fond", "bandeja")
-SUMS = ("total", "sum", "gesamt")
+SUMS = ("total", "sum", "somme", "gesamt")
 """Beginnings of openings in words: none at all, and rows that are no sieves."""
 _HEADS = {
     "opening": "opening|aperture|(?<!under)(?<!over)size|diamet|weite|korngr|kornkl|durchmesser|maille"
-    "|ouverture|abertura|malla|^(sieve|sieb|tamis|tamiz|class|klasse|range)$",
+    "|ouverture|abertura|malla|^(sieve|sieb|tamis|tamiz|class|klasse|range|mesh)$",
     "passing": "passing|finer|undersize|durchgang|passant|tamisat|pasa",
     "retained": "retain|oversize|ruckstand|refus|reteni|anteil",
     "mass": "^(mass|masse|masa|weight|gewicht|poids|peso)$",
@@ -61,10 +61,9 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
     """
     header = UnitHeader(_sieve_column)
     found = list(read_rows(path, ("opening",), SIEVE_COLUMNS, header))
-    column = next((name for name in SIEVE_COLUMNS[2:] if found and name in found[0].cells), None)
+    column = next((name for name in SIEVE_COLUMNS[2:] if name in found[0].cells), None)
     if column is None:
         raise InputError(str(path), f"needs one column of {', '.join(SIEVE_COLUMNS[2:])}", "none")
-    _at_least(path, found, 2)
     unit = header.units.get("opening") or unit
     sieves = [(*_ends(row, unit), row) for row in found if not _name(row).startswith(SUMS)]
     openings, tops, rows = zip(*sorted(sieves, key=lambda sieve: sieve[0]), strict=True)
@@ -108,10 +107,14 @@ class UnitHeader:
         for cell in cells:
             match = _UNIT.search(cell)
             plain, unit = _UNIT.sub("", cell).strip(), (match[1] or match[2]).strip() if match else ""
-            name = self.column(plain, unit)
-            names.append("" if name in names else name)
-            if name and unit and name == names[-1]:
-                self.units[name] = unit
+            names.append(self.column(plain, unit))
+            if names[-1] and unit:
+                self.units[names[-1]] = "um" if unit.lower().startswith("micro") else unit
+        if names.count("opening") > 1 and "opening" in self.units:  # a name or a number of each sieve
+            names = [
+                "" if name == "opening" and not _UNIT.search(cell) else name
+                for name, cell in zip(names, cells, strict=True)
+            ]
         if "number" in names and "opening" not in names:
             names[names.index("number")], self.units["opening"] = "opening", "mesh"
         return names
@@ -127,7 +130,10 @@ def _sieve_column(name: str, unit: str) -> str:
         return name
     if re.search(r"[+&]|\b(with|and|mit|und|avec|et|con|y)\b", plain):
         return ""  # a sieve and what it holds
-    if letters in ("mesh", "meshno", "meshnumber", "sieveno", "sievenumber"):
+    is_number = letters in ("mesh", "meshno", "meshnumber", "sieveno", "sievenumber")
+    if is_number and re.fullmatch(
+        r"(astm|e ?-?11|u\.?s\.?|\W)*", unit.lower()
+    ):  # others' 10 is another sieve
         return "number"
     if "opening" in means:
         return "opening"
@@ -176,27 +182,30 @@ def read_counts(path: Path, unit: str | None = None, column: str | None = None) 
     the columns of an analyser's export.
     """
 
-    def named(name: str, _: str) -> str:
-        if column is not None:
-            return column if name.lower() == _UNIT.sub("", column).strip().lower() else ""
+    def named(name: str, unit: str) -> str:
+        if column is not None and name.lower() == _UNIT.sub("", column).strip().lower():
+            return column
+        # a share that is passed over would make each class one grain
+        is_share = unit == "%" and re.search("^[pq][0-3]|vol|num|count|freq|mass|anteil", name.lower())
+        if column is not None and name.lower() != "count" and not is_share:
+            return ""
         return name.lower() if name.lower() in COUNT_COLUMNS else name
 
     header = UnitHeader(named)
     diameter, needed = column or "diameter", () if column is None else (column,)
     rows = list(read_rows(path, needed, (*COUNT_COLUMNS, *needed), header))
-    unit = next(iter(header.units.values()), None) or unit
-    _at_least(path, rows, 1)
+    units = {name: header.units.get(name) or unit for name in (diameter, "from", "to")}
     if diameter in rows[0].cells:
         if both := [name for name in ("from", "to") if name in rows[0].cells]:
             problem = "must have a column diameter, or from, to and count, not both"
             raise InputError(str(path), problem, f"diameter and {', '.join(both)}")
-        found = [(_length(row, diameter, unit), _count(row)) for row in rows]
+        found = [(_length(row, diameter, units[diameter]), _count(row)) for row in rows]
         between = [(size, size, share) for size, share in sorted(found)]
     else:
         if missing := [name for name in ("from", "to", "count") if name not in rows[0].cells]:
             problem = f"needs a column diameter, or from, to and count; missing: {', '.join(missing)}"
             raise InputError(str(path), problem, ", ".join(rows[0].cells))
-        between = [_class(row, unit) for row in rows]
+        between = [_class(row, units) for row in rows]
         for row, (before, after) in zip(rows[1:], pairwise(between), strict=True):
             if after[0] < before[1]:
                 raise row.error("must not be below the class of the row before", "from")
@@ -223,8 +232,8 @@ def _from_passing(rows: Sequence[Row], passing: Sequence[float], column: str) ->
     return [coarser - finer for finer, coarser in pairwise([*passing, 100.0])]
 
 
-def _class(row: Row, unit: str | None) -> tuple[float, float, float]:
-    low, high = _length(row, "from", unit), _length(row, "to", unit)
+def _class(row: Row, units: Mapping[str, str | None]) -> tuple[float, float, float]:
+    low, high = (_length(row, name, units[name]) for name in ("from", "to"))
     if not high > low:
         raise row.error(f"must be above from, {row['from']}", "to")
     return low, high, _count(row)
@@ -265,9 +274,3 @@ def _one_kind(rows: Sequence[Row], column: str) -> None:
     for row, without in zip(rows, bare, strict=True):
         if without and not all(bare) and Quantity.parse(row[column]).number != 0.0:
             raise row.error("needs a unit like the other rows", column)
-
-
-def _at_least(path: Path, rows: Sequence[Row], least: int) -> None:
-    if len(rows) < least:
-        problem = f"needs {least} rows or more below the names of the columns"
-        raise InputError(str(path), problem, str(len(rows)))

@@ -42,7 +42,7 @@ _NAMES = {
     },
     "r": rf"{_SIZE}(?:radius|radii|rad|r)",
     "d": rf"{_SIZE}(?:diameter|d)|particlesize",
-    "time": "times?|timestep|frame",
+    "time": "t|times?|t?steps?|timesteps?|frames?",
     "body": "clumpid|idmultisphere|mol|grain|owner|particleid|clump",
     "type": "|".join(TYPES),
 }
@@ -95,8 +95,16 @@ def _read(path: Path) -> SphereFile:
             problem = f"must have as many cells as line {header} has names, {len(names)}"
             raise InputError(f"{path}, line {line}", problem, " ".join(cells), "Names must have no blanks.")
     if "time" in kinds:
-        of_last = [cells[kinds.index("time") :][:1] for _, cells in rows]
-        rows = [row for row, time in zip(rows, of_last, strict=True) if time == of_last[-1]]
+        times = [cells[kinds.index("time") :][:1] for _, cells in rows]
+        if (name := names[kinds.index("time")]) == "t" and kinds.index("time") > x and times[0] != times[-1]:
+            problem = "must say whether it is a time or a type"
+            raise InputError(f"{path}, line {header}", problem, name, "Call the column time, or type.")
+        rows = [row for row, time in zip(rows, times, strict=True) if time == times[-1]]
+    for kind, at in zip(("x", "y", "z", size), (x, y, z, r), strict=True):
+        for other in (n for n, each in enumerate(kinds) if each == kind):
+            if any(cells[other : other + 1] != cells[at : at + 1] for _, cells in rows):
+                problem, twice = f"must have one column {kind}", f"{names[at]}, {names[other]}"
+                raise InputError(f"{path}, line {header}", problem, twice, "Rename the others.")
     sizes = [_unit_of(names[column], f"{path}, line {header}") for column in columns.needed()[:4]]
     if SHEET_UNIT in names:
         sizes = [_unit_of_rows(rows, names.index(SHEET_UNIT), path)] * 4

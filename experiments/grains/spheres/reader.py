@@ -44,6 +44,7 @@ HEAD = 65536
 GZIP = b"\x1f\x8b"
 """First bytes of a file that is compressed by gzip."""
 
+_POINTS = "Write its points as a table of x, y, z, radius."
 _CUSTOM = "Write a custom dump with x y z radius."
 _BINARY = ("a binary dump of LAMMPS or LIGGGHTS", "Write a text dump: a name that does not end in .bin.")
 _VIDEO = ("a video", "Save one frame as PNG or JPEG.")
@@ -58,7 +59,8 @@ OTHERS = {
     "\x89HDF": ("an HDF5 file", "Export centres and radii as VTK or CSV."),
     "CDF": ("a NetCDF file", "Export centres and radii as VTK or CSV."),
     **dict.fromkeys(("BZh", "\x28\xb5\x2f\xfd", "\xfd7zXZ", "7z\xbc\xaf", "Rar!"), _PACKED),
-    **dict.fromkeys(("ply\n", "ply\r\n"), ("a PLY file", "Write its points as a table of x, y, z, radius.")),
+    **dict.fromkeys(("ply\n", "ply\r\n"), ("a PLY file", _POINTS)),
+    **dict.fromkeys((".PCD v", "VERSION .", "VERSION 0."), ("a PCD file", _POINTS)),
     "%PDF": ("a PDF", "Save its picture as PNG or JPEG."),
     "PK\x03\x04": (
         "a ZIP archive or an Office document",
@@ -70,7 +72,8 @@ OTHERS = {
 """Names of other formats, with a hint, by a mark in their first 32 bytes."""
 
 WEB = ("<!doctype html", "<html")
-"""Beginnings of a web page: a download often is the page of an error."""
+PCD = ("# .pcd v", "version .", "version 0.")
+"""Beginnings of a web page, which a download with an error often is, and of points that look like a table."""
 
 
 @contextmanager
@@ -98,7 +101,7 @@ def head_of(path: Path) -> str:
 def format_of(path: Path) -> Format | None:
     """Find the format of a file by its content; None if it has none of `FORMATS`."""
     head = head_of(path)
-    if head.lstrip().lower().startswith(WEB):
+    if head.lstrip().lower().startswith((*WEB, *PCD)):
         return None
     if VTK.recognises(head):
         return VTK

@@ -10,7 +10,7 @@ from commandline import dem_warp
 
 from dem_warp.clump_fitting import fit_clump
 from dem_warp.solids import parse_solid
-from experiments.grains.clumps.clump_search import Trial, fit_by_volume, fit_within
+from experiments.grains.clumps.clump_search import Trial, fit_with, fit_within
 from experiments.io.errors import InputError
 
 DICE = 4.0
@@ -59,7 +59,7 @@ def test_a_ball_has_no_error() -> None:
 
 def test_the_protrusion_found_keeps_the_volume() -> None:
     solid = parse_solid("ellipsoid:6x3x3")
-    fit, protrusion = fit_by_volume(solid, 3)
+    fit, protrusion = fit_with(solid, 3, None)
     assert abs(fit.volume_error) <= 0.01
     assert fit.shape.volume == pytest.approx(fit_clump(solid, 3, protrusion).shape.volume, rel=1e-12)
 

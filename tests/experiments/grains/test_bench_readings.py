@@ -179,7 +179,7 @@ def test_a_table_has_a_column_for_each_quantity(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("no.,angel\n1,20\n", "needs rows below the columns angle"),
-        ("angle\n", "needs rows below"),
+        ("angle\n", "has no rows below"),
         ("angle\n20\nsteep\n", "readings.csv:3: angle: must be a number"),
     ],
 )

@@ -128,6 +128,8 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
     assert found.mass_lost == pytest.approx(0.0, abs=1e-12)
     classed = "from,to,count\n800,900,16\n900,1000,34\n1000,1100,34\n1100,1200,16\n"
     by_class = cut_classes(read_counts(table(tmp_path, classed), "um"), "number", (0.0, 1.0), 10)
+    units = "from (um),to (mm),count (%)\n800,0.9,16\n900,1,34\n1000,1.1,34\n1100,1.2,16\n"
+    assert read_counts(table(tmp_path, units)) == read_counts(table(tmp_path, classed), "um")
     # A class of 10 % width: the mean cube of normal grains in it, to a percent.
     assert by_class.mean_mass_diameter == pytest.approx(found.mean_mass_diameter, rel=0.01)
 
@@ -149,13 +151,21 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
         ("opening,retained\n1,-3\n2,4\n", "mm", r"sizes.csv:2: retained: must be 0 or more, got -3"),
         ("opening,retained\n1,x\n2,4\n", "mm", r"sizes.csv:2: retained: must be a number"),
         ("opening,retained\n1,0\n2,4\n", "mm", r"sizes.csv: retained: must have mass between two sieves"),
-        ("opening,retained\n1,3\n", "mm", r"sizes.csv: needs 2 rows or more .*got 1"),
+        ("opening,retained\n1,3\n", "mm", r"sizes.csv: retained: must have mass between two sieves, got 0"),
+        ("opening,retained\n", "mm", r"sizes.csv: has no rows below the names of the columns"),
         ("opening\n1\n2\n", "mm", r"sizes.csv: needs one column of retained, .*got none"),
         (
             "Maschenweite [µm];Rückstand [g]\n2.000;3\n1.000;4\n",
             None,
             r"sizes.csv:2: opening: may be a thousand times as large: write it without a point, got 2.000",
         ),
+        (
+            "Sieve (mm),Retained (g),Refus (g),% retained\n2,0,1,0\n1,30,40,100\n",
+            None,
+            r"sizes.csv:1: must have one column retained, got Retained \(g\), Refus \(g\). Rename the others",
+        ),
+        # 10 mesh of Tyler's has 1.7 mm, that of ASTM 2 mm
+        ("Mesh (Tyler),Retained (g)\n10,3\n20,4\n", None, r"sizes.csv:2: opening: needs a unit of length"),
         (
             "opening,retained\n1-2,3\n2.5-3,4\n",
             "mm",
@@ -330,6 +340,8 @@ SHEETS = {
     "a sieve and what it holds": "Sieve size (mm),Sieve + retained (g),Retained (g)\n"
     "2,400,0\n1,420,30\n0.5,440,60\nPan,310,10\n",
     "a column of numbers": "Mesh,Mass retained (g)\n#10,0\n18,30\n35,60\nPan,10\n",
+    "a name of each sieve": "Sieve,Sieve opening (mm),Retained (g)\nA,2,0\nB,1,30\nC,0.5,60\nPan,0,10\n",
+    "a mesh in micrometres": "Mesh (microns),Retained (g)\n2000,0\n1000,30\n500,60\nPan,10\nSomme,100\n",
     "a pan among the numbers": "Sieve No.,Opening (mm),Retained (g)\n10,2,0\n18,1,30\n35,0.5,60\n"
     "Pan,,10\nTotal,,100\n",
     "a whole sheet": "Sample,river sand\n"
@@ -360,6 +372,11 @@ def test_an_analysers_export_has_its_diameter_in_a_named_column(
     mean = load_study(with_sizes(write_study, study)).case({}, seed=1).grains.mixture.shapes[0].radii[0]
     # the grain of the mean mass of one of 1 mm and two of 2 mm, within the classes' width
     assert 2.0 * mean == pytest.approx(1e-3 * (17.0 / 3.0) ** (1.0 / 3.0), rel=0.01)
+    with pytest.raises(InputError, match=r"must be a known column, known: .*count.*got Volume"):
+        # shares of classes, of which each would be one grain
+        read_counts(table(tmp_path, "Size (um),Volume (%)\n100,20\n200,80\n"), None, "Size")
+    counted = read_counts(table(tmp_path, "Size (um),Count\n100,20\n200,80\n"), None, "Size")
+    assert (counted.lows, counted.shares) == (pytest.approx((1e-4, 2e-4)), (0.2, 0.8))
     with pytest.raises(InputError, match="missing: Feret"):
         read_counts(table(tmp_path, export), None, "Feret")
 

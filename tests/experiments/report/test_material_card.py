@@ -1,5 +1,6 @@
 """Material cards: what a campaign found, read back as a study's material."""
 
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from commandline import dem_warp
 
 from doe import Sample
 from experiments.calibrate import Campaign
@@ -143,3 +145,18 @@ def test_two_clumps_of_one_name_stay_two(tmp_path: Path) -> None:
     copies = {name: shape["clump"] for name, shape in sections["grain"]["shapes"].items()}
     assert {name: (folder / copy).read_text(encoding="utf-8") for name, copy in copies.items()} == files
     assert sorted({*copies.values()}) == ["material-grain-2.txt", "material-grain.txt"]
+
+
+def test_what_a_card_lacks_is_said_where_it_is_exported(card: Path, tmp_path: Path) -> None:
+    text = card.read_text(encoding="utf-8")
+    bare = card.with_name("bare.toml")
+    bare.write_text(
+        re.sub(r"\[(material\.solver|fitted\.(numerics|measurement))\][^\[]*", "", text), encoding="utf-8"
+    )
+    lacking = (
+        "the card lacks its contact laws ([material.solver]; 'edem' is taken), modulus scale and time step"
+    )
+    for path, said in ((card, False), (bare, True)):
+        code, _, messages = dem_warp("export", path, "--to", "edem", "--out", tmp_path / path.stem)
+        readme = (tmp_path / path.stem / "README.md").read_text(encoding="utf-8")
+        assert (code, lacking in " ".join(messages.split()), lacking in readme) == (0, said, said)

@@ -107,7 +107,9 @@ def test_a_time_that_nobody_knows_is_unknown(write_study: Write, monkeypatch: py
     assert json.loads(dem_warp(*words, "--json")[1])["seconds"] is None
     noted = lambda _, like: (1.0e6, (1,)) if like.spheres > 1.0 else None  # noqa: E731
     monkeypatch.setattr(speed, "noted_speed", noted)
-    assert "Time: unknown until the first such run." in dem_warp(*words)[1]
+    said = dem_warp(*words)[1]
+    assert "Time: unknown" not in said
+    assert "from 1 batch on this machine, without start and report. Not counted" in said
 
 
 def test_a_search_is_planned(tmp_path: Path) -> None:
@@ -153,6 +155,19 @@ def test_a_campaign_and_one_of_its_heaps_have_forecasts_that_agree(write_study: 
     one = heap["batches"][0]["seconds"]
     assert 1 / 1.5 < np.average(each) / one < 1.5  # two workers share the campaign
     assert all(1 / 1.5 < seconds / one < 1.5 for seconds in each)
+
+
+def test_after_a_campaign_the_time_of_one_of_its_heaps_is_known(
+    write_study: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # no heap has run: the time of its start and report is unknown, that of its case is the campaign's
+    noted = lambda _, like: (1.0e6, (0,)) if like.kind != "heap" else None  # noqa: E731
+    monkeypatch.setattr(speed, "noted_speed", noted)
+    campaign = planned("calibrate", write_study())
+    heap = json.loads(dem_warp("heap", write_study(), "--device", "cpu", "--dry-run", "--json")[1])
+    each = [2 * batch["seconds"] / batch["cases"] for batch in campaign["batches"] if batch["cases"]]
+    assert 1 / 1.5 < np.average(each) / heap["seconds"] < 1.5  # two workers share the campaign
+    assert heap["source"] == "from 1 batch on this machine, without start and report"
 
 
 def test_jobs_are_not_submitted_for_a_plan(write_study: Write, tmp_path: Path) -> None:

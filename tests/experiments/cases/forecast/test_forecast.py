@@ -125,6 +125,20 @@ def test_a_launch_of_another_size_tells_nothing_of_a_gpu() -> None:
     assert forecast([WORK] * 30, workers_of(2, on_gpu=True, sharing=2)) == (None, ())
 
 
+def test_batches_of_another_number_of_workers_count_where_none_had_as_many(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(speed, "cores", lambda: 4)
+    two, one, many = (workers_of(n, machine=f"this, CPU, {n} worker{'s' * (n > 1)}") for n in (2, 1, 16))
+    note([WORK] * 4, two, 20.0)
+    assert forecast([WORK], one) == (pytest.approx(10.0), (0,))
+    # sixteen workers on four cores are each as slow as they are many
+    assert forecast([WORK], many) == (None, ())
+    note([WORK], one, 8.0)
+    assert forecast([WORK], one) == (pytest.approx(8.0), (1,))
+    assert forecast([WORK] * 4, two) == (pytest.approx(20.0), (0,))
+
+
 def test_impossible_speeds_are_not_noted_and_one_outlier_counts_little(notes: Path) -> None:
     note([WORK], workers_of(), 0.01)
     note([WORK], workers_of(), 50.0, part=0.1)

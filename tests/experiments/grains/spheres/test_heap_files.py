@@ -276,14 +276,44 @@ def test_a_vtkhdf_file_without_spheres_says_what_it_lacks(tmp_path: Path) -> Non
     assert f"{bare}: the points need an array radius" in refused("angle", bare)
 
 
-def test_a_heap_whose_height_is_along_y_is_read_so(tmp_path: Path) -> None:
+@pytest.mark.parametrize("head", ["t,x,y,z,r", "t (s),x,y,z,r", "step,x,y,z,r", "frame,x,y,z,r"])
+def test_of_a_table_with_times_the_last_is_read(tmp_path: Path, head: str) -> None:
+    path = tmp_path / "heap.csv"
+    path.write_text(f"{head}\n0,0,0,1,1\n0,0,0,3,1\n0.5,4,0,1,2\n0.5,0,4,1,2\n", "utf-8")
+    assert read_spheres(path).spheres.tolist() == [[4.0, 0.0, 1.0, 2.0], [0.0, 4.0, 1.0, 2.0]]
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        (
+            "x,y,z,r,t",
+            "line 1: must say whether it is a time or a type, got t. Call the column time, or type",
+        ),
+        ("x,y,z,r,radius", "line 1: must have one column r, got r, radius. Rename the others"),
+        ("x,y,z,r,Position Z", "line 1: must have one column z, got z, Position Z. Rename the others"),
+    ],
+)
+def test_a_column_with_two_meanings_is_refused(tmp_path: Path, head: str, message: str) -> None:
+    path = tmp_path / "heap.csv"
+    path.write_text(f"{head}\n0,0,1,1,1\n0,0,3,1,2\n", "utf-8")
+    assert f"heap.csv, {message}" in refused("angle", path)
+    path.write_text(f"{head}\n0,0,1,1,1\n0,0,1,1,1\n", "utf-8")
+    assert len(read_spheres(path).spheres) == 2, "the same numbers have one meaning"
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "-x", "-y", "-z"])
+def test_a_heap_whose_height_is_along_another_axis_is_read_so(tmp_path: Path, axis: str) -> None:
     heap = read_spheres(DATA / "lammps_scaled.dump").spheres
     [upright] = measured(DATA / "lammps_scaled.dump")
-    np.savez(tmp_path / "y.npz", position=heap[:, [0, 2, 1]] * [1, 1, -1], radius=heap[:, 3])
-    [row] = measured(tmp_path / "y.npz")
+    turned = heap[:, [1, 0, 2]] * [1.0, 1.0, -1.0] if axis.startswith("-") else heap[:, :3]
+    places = np.roll(turned, "xyz".index(axis[-1]) - 2, axis=1)
+    np.savez(tmp_path / "a.npz", position=places, radius=heap[:, 3])
+    [row] = measured(tmp_path / "a.npz")
+    # the same spheres, seen from the same eight sides
     assert (row["mean"], row["se"]) == pytest.approx((upright["mean"], upright["se"]), abs=1e-9)
-    assert "height seems to be along y" in row["source"]
-    assert "along y" not in upright["source"]
+    assert f"height seems to be along {axis}" in row["source"]
+    assert "along" not in upright["source"]
 
 
 @pytest.mark.parametrize("column", ["v_radius", "v_r", "c_diameter", "f_d", "d_rad"])
