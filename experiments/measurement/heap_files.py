@@ -38,6 +38,8 @@ DEFAULT_UNIT = "m"
 """Unit of a heap's file without a unit; angles do not depend on it."""
 BELOW = 0.5
 """Depth under the plate, in radii, of a sphere that fell off it."""
+OVERFULL = 20.0
+"""Largest volume of spheres over that of the box around them: those of a clump overlap."""
 LEAST_PLANE, PLANE_OF_ALL, PLANE = 20, 0.02, 0.9
 """Fewest spheres in one plane that are mentioned, also as a part of all, and their least part of those within
 `REST`: of equal grains on a plate of LIGGGHTS, LAMMPS and Yade, half have one depth in six digits."""
@@ -128,6 +130,10 @@ def _measured(
     spheres = seen_upright(spheres, axis := height_axis(spheres))
     up = -1.0 if axis.startswith("-") else 1.0
     given = None if settings.plate_height is None else up * settings.plate_height
+    room = float((np.ptp(spheres.centers, axis=0) + 2.0 * spheres.radii.max()).prod())
+    if (filled := 4.0 * float((spheres.radii**3).sum()) / room) > OVERFULL:
+        problem = f"the spheres would fill their room {filled:.0f} times: is the radius in another column?"
+        raise InputError(str(path), problem)
     height = find_ground(spheres) if given is None else given
     standing = spheres.centers[:, 2] > height - BELOW * spheres.radii
     if not standing.any():

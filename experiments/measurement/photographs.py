@@ -241,24 +241,13 @@ def _values(angle: ReposeAngle) -> Row:
 
 def drawn_names(pictures: Sequence[Path]) -> list[str]:
     """Return short and different names of the drawn copies."""
-    names = [f"{picture.stem}-angle.png" for picture in pictures]
-    for depth in range(2, 2 + max((len(picture.parts) for picture in pictures), default=0)):
-        # names may differ by case alone, which some systems ignore
+    long = [f"{p.parent.name}_{p.name.replace('.', '-')}".translate(NOT_IN_NAMES) for p in pictures]
+    names = [picture.stem for picture in pictures]
+    # names may differ by case alone, which some systems ignore
+    for longer in (long, [f"{name}-{number}" for number, name in enumerate(long, start=1)]):
         count = Counter(name.casefold() for name in names)
-        names = [
-            "_".join((*picture.parts[-depth:-1], f"{picture.name.replace('.', '-')}-angle.png")).translate(
-                NOT_IN_NAMES
-            )
-            if count[name.casefold()] > 1
-            else name
-            for picture, name in zip(pictures, names, strict=True)
-        ]
-    seen: Counter[str] = Counter()
-    different = []
-    for name in names:
-        times = seen[name.casefold()] = seen[name.casefold()] + 1
-        different.append(name if times == 1 else f"{name.removesuffix('.png')}-{times}.png")
-    return different
+        names = [two if count[one.casefold()] > 1 else one for one, two in zip(names, longer, strict=True)]
+    return [f"{name}-angle.png" for name in names]
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from experiments.io.texts import delimiter_of, is_number, split
 from experiments.io.units import UNITS
 
 _COLUMNS = re.compile(r"\bx,? y,? z,? r\b")
+_DIAMETERS = re.compile(r"^\s*#.*\bx[,;\s]+y[,;\s]+z[,;\s]+d", re.MULTILINE | re.IGNORECASE)
 _NAMED_UNIT = re.compile(rf"\bin ({'|'.join(UNITS['length'])})\b")
 """Unit in a comment of dem-warp, after the names of the columns."""
 
@@ -43,7 +44,10 @@ def _read(path: Path) -> SphereFile:
             raise InputError(f"{path}, line {number}", SPHERE_RULE, " ".join(cells))
     rows = ((number, split(line, delimiter)) for number, line in lines)
     description = "spheres (x y z r, as in multisphere templates of LIGGGHTS)"
-    read = spheres_of(description, rows, Columns(0, 1, 2, 3), path, delimiter)
+    columns = Columns(0, 1, 2, 3, is_diameter=bool(_DIAMETERS.search(text)))
+    if columns.is_diameter:
+        description = "spheres (x y z d, by a comment)"
+    read = spheres_of(description, rows, columns, path, delimiter)
     return replace(read, unit=_named_unit(text))
 
 

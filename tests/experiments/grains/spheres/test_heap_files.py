@@ -276,6 +276,16 @@ def test_a_vtkhdf_file_without_spheres_says_what_it_lacks(tmp_path: Path) -> Non
     assert f"{bare}: the points need an array radius" in refused("angle", bare)
 
 
+def test_lines_of_another_order_and_diameters_are_no_silent_radii(tmp_path: Path) -> None:
+    heap = read_spheres(DATA / "liggghts_spheres.dump").spheres
+    np.savetxt(tmp_path / "first.txt", heap[:, [3, 0, 1, 2]] + [0.0, 0.0, 0.0, 0.1])
+    np.savetxt(tmp_path / "plain.txt", heap)
+    np.savetxt(tmp_path / "wide.txt", heap * [1, 1, 1, 2], header="x y z diameter")
+    assert "is the radius in another column?" in refused("angle", tmp_path / "first.txt")
+    [plain], [wide] = measured(tmp_path / "plain.txt"), measured(tmp_path / "wide.txt")
+    assert wide["mean"] == pytest.approx(plain["mean"], abs=1e-9)
+
+
 @pytest.mark.parametrize("head", ["t,x,y,z,r", "t (s),x,y,z,r", "step,x,y,z,r", "frame,x,y,z,r"])
 def test_of_a_table_with_times_the_last_is_read(tmp_path: Path, head: str) -> None:
     path = tmp_path / "heap.csv"
