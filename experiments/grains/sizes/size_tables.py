@@ -23,7 +23,7 @@ SIEVE_COLUMNS = (
 )  # fmt: skip
 COUNT_COLUMNS = ("diameter", "from", "to", "count")
 PANS = ("pan", "receiver", "tray", "bottom", "base", "fines", "boden", "pfanne", "schale", "fond", "bandeja")
-SUMS = ("total", "sum", "somme", "gesamt")
+SUMS = ("total", "sum", "somm", "gesamt")
 """Beginnings of openings in words: none at all, and rows that are no sieves."""
 _HEADS = {
     "opening": "opening|aperture|(?<!under)(?<!over)size|diamet|weite|korngr|kornkl|durchmesser|maille"
