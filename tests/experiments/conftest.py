@@ -80,10 +80,8 @@ def chromium() -> Iterator[Browser]:
 @pytest.fixture
 def _coarse_clumps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fit clumps with half the samples along a side, an eighth in all, where more would show no more."""
-    for module in ("clump_maker", "clump_search"):
-        monkeypatch.setattr(
-            f"experiments.grains.clumps.{module}.fit_clump", partial(fit_clump, resolution=20)
-        )
+    coarse = partial(fit_clump, resolution=20)
+    monkeypatch.setattr("experiments.grains.clumps.clump_search.fit_clump", coarse)
 
 
 SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ from experiments.io.texts import delimiter_of, is_number, split
 from experiments.io.units import UNITS
 
 _COLUMNS = re.compile(r"\bx,? y,? z,? r\b")
-_DIAMETERS = re.compile(r"^\s*#.*\bx[,;\s]+y[,;\s]+z[,;\s]+d", re.MULTILINE | re.IGNORECASE)
+_DIAMETERS = re.compile(r"^[ \t]*#.*\bx[,; \t]+y[,; \t]+z[,; \t]+d", re.MULTILINE | re.IGNORECASE)
 _NAMED_UNIT = re.compile(rf"\bin ({'|'.join(UNITS['length'])})\b")
 """Unit in a comment of dem-warp, after the names of the columns."""
 
