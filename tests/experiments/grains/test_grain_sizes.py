@@ -321,7 +321,6 @@ SHEETS = {
     "Spanish masses": "Tamiz, mm\tPeso retenido, g\n2\t0\n1\t30\n0,5\t60\nBandeja\t10\nTotal\t100\n",
     "per cent in each cell": "opening,passing_percent\n2 mm,100 %\n1 mm,70 %\n0.5 mm,10%\n",
     "Greek and other micrometres": "Particle size (μm),Retained %\n2000,0\n1000,30\n500 µm,60\n0,10\n",
-    "undersize": "Size class (mm),Cum. undersize (%)\n2,100\n1,70\n0.5,10\n",
     "oversize": "Sieve (mm),Oversize (%)\n2,0\n1,30\n0.5,90\n",
     "a sieve and what it holds": "Sieve size (mm),Sieve + retained (g),Retained (g)\n"
     "2,400,0\n1,420,30\n0.5,440,60\nPan,310,10\n",
