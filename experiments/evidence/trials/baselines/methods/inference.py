@@ -97,12 +97,12 @@ class Drawn:
     """Coded factors, and sizes of all mechanisms: NaN where a model has not got one, (draws, parameters)."""
 
 
-def drawn_means(problem: Problem, rng: np.random.Generator, times: int = 1) -> Drawn:
+def drawn_means(problem: Problem, rng: np.random.Generator) -> Drawn:
     """Draw from the base, every mechanism and every pair, of each by its prior probability."""
     names = problem.emulator.space.names
     models: tuple[Mechanisms, ...] = ((), *problem.singles, *combinations(names, 2))
     share = {0: 0.5} | {size: 0.5 * prior for size, prior in prior_of_one(len(names)).items()}
-    counts = [max(round(times * POINTS * share[len(model)]), 1) for model in models]
+    counts = [max(round(POINTS * share[len(model)]), 1) for model in models]
     drawn = [
         predicted_means(problem.stack(model), rng, count, REPEATS)
         for model, count in zip(models, counts, strict=True)

@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 MIXED = 3
 """Distributions in each mixture."""
-TIMES, HELD = 2, 0.1
-"""Draws for each of `sbi`, and the share of them that decides when training ends."""
+HELD = 0.1
+"""Share of the draws that decides when training ends."""
 FLOOR = 1e-4
 """Least surplus of a diagonal, and least standard deviation, as in the published code."""
 
@@ -84,7 +84,7 @@ class Sbmi:
 def _learn(problem: Problem) -> Network:
     from torch import nn
 
-    drawn = drawn_means(problem, np.random.default_rng(problem.seed), TIMES)
+    drawn = drawn_means(problem, np.random.default_rng(problem.seed))
     names = problem.emulator.space.names
     present = tensor(np.array([[name in model for name in names] for model in drawn.models]))
     centre, scale = drawn.means.mean(axis=0), drawn.means.std(axis=0)
