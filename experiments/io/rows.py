@@ -41,14 +41,14 @@ class Row:
 def read_rows(
     path: Path,
     needed: Collection[str],
-    known: Collection[str],
+    known: Collection[str] | None,
     renamed: Callable[[list[str]], list[str]] | None = None,
 ) -> Iterator[Row]:
     """Read the rows of a CSV file in UTF-8, or of Excel; empty rows and those that begin ``#`` are skipped.
 
-    The first row names the columns: all that are needed, and any of the known ones. With `renamed`, which
-    returns known names and empty ones for columns to ignore, it is the first row with all needed columns.
-    A line of one cell above a row of several names is a title.
+    The first row names the columns: all that are needed, and any of the known ones; None: any name. With
+    `renamed`, which returns known names and empty ones for columns to ignore, it is the first row with all
+    needed columns. A line of one cell above a row of several names is a title.
     Raise InputError when the file cannot be read, its columns are not these, or a row has more cells than
     columns; or without a row.
     """
@@ -124,13 +124,13 @@ def _delimiter(text: str) -> str:
 
 
 def _check_header(
-    place: str, cells: list[str], header: list[str], needed: Collection[str], known: Collection[str]
+    place: str, cells: list[str], header: list[str], needed: Collection[str], known: Collection[str] | None
 ) -> None:
     if missing := [name for name in needed if name not in header]:
         problem = f"the first row must name the columns; missing: {', '.join(missing)}"
         raise InputError(place, problem, ", ".join(header))
     for name in header:
-        if name and name not in known:
+        if name and known is not None and name not in known:
             raise InputError(place, f"must be a known column, {nearest_name(name, list(known))}", name)
         if name and header.count(name) > 1:
             twice = ", ".join(cell for cell, own in zip(cells, header, strict=True) if own == name)

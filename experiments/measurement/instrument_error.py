@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from doe.discrepancy import Calibration
-from experiments.io.errors import InputError
 from experiments.io.rows import Row
 from experiments.io.texts import nearest_name
 from experiments.io.units import Quantity
@@ -115,7 +114,7 @@ def _value(row: Row, unit: str) -> float:
             quantity = replace(quantity, unit=unit)
         value = quantity.to_base(DIMENSIONS[unit]) / (100.0 if share else 1.0)
     except ValueError as error:
-        raise InputError(f"{row.file}:{row.line}: value", str(error), row["value"] or "nothing") from None
+        raise row.error(str(error), "value") from None
     if not (value >= 0.0 and math.isfinite(value)) or (share and unit != "1"):
         raise row.error("must be a standard deviation, 0 or more, in the unit of the observable", "value")
     return value

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import special
 
 from doe import Sample
 from experiments.grains.spheres import require_known, require_no_text
@@ -41,6 +40,7 @@ from imaging import (
     save_picture,
 )
 from imaging.geometry import Picture
+from imaging.repose import confidence_interval
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".heic", ".heif")
 """Endings of the pictures in a folder."""
@@ -296,11 +296,9 @@ def mean_angle(rows: Sequence[Mapping[str, Any]], options: PictureOptions | None
     means = np.array([np.mean(views) for views in heaps.values()])
     left_out = tuple(row["picture"] for row in rows if row["mean"] is not None and row not in used)
     mean, n = float(means.mean()), len(means)
-    if n == 1:
-        return MeanAngle(mean, None, n, None, None, len(used), left_out, options.subject)
-    sd = float(means.std(ddof=1))
-    reach = float(special.stdtrit(n - 1, 0.5 + 0.5 * LEVEL)) * sd / np.sqrt(n)
-    return MeanAngle(mean, sd, n, mean - reach, mean + reach, len(used), left_out, options.subject)
+    sd = float(means.std(ddof=1)) if n > 1 else None
+    low, high = (None, None) if sd is None else confidence_interval(mean, sd / n**0.5, n - 1, LEVEL)
+    return MeanAngle(mean, sd, n, low, high, len(used), left_out, options.subject)
 
 
 def target_sample(rows: Sequence[Mapping[str, Any]], options: PictureOptions, place: str) -> Sample:

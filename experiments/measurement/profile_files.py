@@ -221,8 +221,8 @@ def _drawn_surface(row: Row, radius: float) -> dict[int, float]:
 
 def _at_stations(view: Mapping[float, float], places: np.ndarray) -> dict[int, float]:
     """Return the heights between the points of a view at the stations that it spans."""
-    x = sorted(view)
-    heights = np.interp(places, x, [view[each] for each in x])
+    x, z = np.array(sorted(view.items())).T
+    heights = np.interp(places, x, z)
     return {n: float(h) for n, h in enumerate(heights) if x[0] <= places[n] <= x[-1]}
 
 
@@ -291,8 +291,7 @@ def _label(row: Row) -> str:
 
 def _check_surface(view: _Points, radius: float, place: str) -> None:
     """Refuse a profile of a drum with a gap, or that rises where it must fall."""
-    x = np.array(sorted(view.heights))
-    z = np.array([view.heights[each] for each in x])
+    x, z = np.array(sorted(view.heights.items())).T
     widest = int(np.argmax(np.diff(x)))
     if x[widest + 1] - x[widest] > WIDEST_GAP * radius:
         problem = f"points must be at most {1e3 * WIDEST_GAP * radius:.4g} mm apart"
@@ -308,8 +307,7 @@ def _outline(view: _Points, place: str, size: ValueLimits) -> np.ndarray:
     """Return the heights of an outline at its stations, from its points."""
     from imaging import profile_heights
 
-    x = np.array(sorted(view.heights))
-    z = np.array([view.heights[each] for each in x])
+    x, z = np.array(sorted(view.heights.items())).T
     if len(x) < LEAST_POINTS:
         raise InputError(place, f"a heap's profile needs {LEAST_POINTS} points or more", len(x))
     if max(z[0], z[-1]) > FOOT * z.max():

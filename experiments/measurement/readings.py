@@ -58,11 +58,10 @@ class Outlines:
 
         if (path, pixel) not in self._found:
             try:
-                found = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
+                picture = read_picture(path)
+                self._found[path, pixel] = find_outline(picture, meters_per_pixel=pixel, place=str(path))
             except PictureError as error:
                 self._found[path, pixel] = error
-            else:
-                self._found[path, pixel] = found
         known = self._found[path, pixel]
         if isinstance(known, PictureError):
             raise known

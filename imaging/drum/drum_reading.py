@@ -13,6 +13,7 @@ from imaging.drum.circle import Circle, find_circle
 from imaging.flank.outline import Doubt
 from imaging.flank.roughness import SlopeError, slope_error
 from imaging.geometry import FloatArray, Picture
+from imaging.photo.doubts import LARGEST_ERROR, doubts_of_mean
 from imaging.photo.view_settings import View
 from imaging.picture_error import PictureError
 from imaging.repose import confidence_interval
@@ -30,8 +31,6 @@ LEAST_CIRCLE = 24
 SHORT_ARC, LARGEST_ELLIPTICITY = 0.3, 0.03
 """Visible part of the circle below which it is doubted, and difference of the rim's half axes over their mean
 above which the camera is not on the axis."""
-LARGEST_ERROR = 0.75
-"""Standard error of the dynamic angle [degrees]."""
 LARGEST_STEP = 0.15
 """Step between neighbouring columns of the surface [radii]: it overhangs, or something hides it."""
 LARGEST_MIXED = 0.04
@@ -215,10 +214,7 @@ def _doubts(
     if circle.ellipticity > LARGEST_ELLIPTICITY:
         finding = f"the rim is {circle.ellipticity:.1%} from round, over {LARGEST_ELLIPTICITY:.0%}"
         yield Doubt("rim", f"{finding}: look along the axis")
-    if se > LARGEST_ERROR:
-        yield Doubt("error", f"a standard error of {se:.2f} degrees, over {LARGEST_ERROR:g}")
-    if not ANGLES[0] <= angle <= ANGLES[1]:
-        yield Doubt("range", f"{angle:.1f} degrees, outside {ANGLES[0]:g} to {ANGLES[1]:g}")
+    yield from doubts_of_mean(angle, se, LARGEST_ERROR, usual=ANGLES)
     if filling is not None and not FILLINGS[0] <= filling <= FILLINGS[1]:
         yield Doubt("range", f"a filling of {filling:.2f}, outside {FILLINGS[0]:g} to {FILLINGS[1]:g}")
     if not np.isfinite(surface.height[middle]).all():

@@ -43,14 +43,14 @@ def slope_error(x: FloatArray, residual: FloatArray) -> SlopeError:
     scale = float(means @ means)
     if scale <= 1e-18 * count:
         return SlopeError(0.0, float(count - SHAPE_TERMS))
-    model = _model(count)
-    squares = np.maximum(np.einsum("i,kij,j->k", means, model.projections, means), 1e-12 * scale)
+    projections, constants, slope_variances = _model(count)
+    squares = np.maximum(np.einsum("i,kij,j->k", means, projections, means), 1e-12 * scale)
     free = count - SHAPE_TERMS
-    likelihood = model.constants - 0.5 * free * np.log(squares)
+    likelihood = constants - 0.5 * free * np.log(squares)
     weight = np.exp(likelihood - likelihood.max())
     weight /= weight.sum()
     width = float(x[-1] - x[0]) / (len(x) - 1) * len(x) / count
-    variances = squares / free * model.slope_variances / width**2
+    variances = squares / free * slope_variances / width**2
     # The error is uncertain by a factor: average its logarithm, and take the spread off the freedom.
     logarithms = np.log(variances)
     mean = float(weight @ logarithms)
@@ -63,21 +63,13 @@ def _white(x: FloatArray, residual: FloatArray) -> SlopeError:
     return SlopeError(float(residual @ residual) / dof / float(((x - x.mean()) ** 2).sum()), dof)
 
 
-@dataclass(frozen=True)
-class _Model:
-    """Terms of the likelihood of each correlation length, for a number of bins.
-
-    `projections` (k, n, n) give the weighted squares without the shape, `constants` (k,) the part of the log
-    likelihood that does not depend on the data, `slope_variances` (k,) the slope's at unit variance.
-    """
-
-    projections: FloatArray
-    constants: FloatArray
-    slope_variances: FloatArray
-
-
 @cache
-def _model(count: int) -> _Model:
+def _model(count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return terms of the likelihood of each correlation length, for a number of bins.
+
+    Projections (k, n, n) give the weighted squares without the shape, constants (k,) the part of the log
+    likelihood that does not depend on the data, variances (k,) the slope's at unit variance.
+    """
     place = np.arange(count, dtype=np.float64)
     centered = (place - place.mean()) / count
     shape = np.vander(centered, SHAPE_TERMS)
@@ -93,4 +85,4 @@ def _model(count: int) -> _Model:
         logarithms = np.linalg.slogdet(correlation)[1] + np.linalg.slogdet(gram)[1]
         constants.append(-0.5 * logarithms)
         variances.append(float(slope @ correlation @ slope))
-    return _Model(np.array(projections), np.array(constants), np.array(variances))
+    return np.array(projections), np.array(constants), np.array(variances)

@@ -55,12 +55,14 @@ LARGEST_SHIFT = 1.0
 """Change of the mean with the threshold [degrees]: that of an edge is small, that of a shadow is not."""
 
 
-def doubts_of_mean(mean: float, se: float, largest_error: float, whole: float = 0.0) -> Iterator[Doubt]:
+def doubts_of_mean(
+    mean: float, se: float, largest_error: float, whole: float = 0.0, usual: tuple[float, float] = (5.0, 60.0)
+) -> Iterator[Doubt]:
     """Doubt a large standard error, the `whole` of which may have more parts, and an unusual angle."""
     if se > largest_error:
         yield Doubt("error", f"a standard error of {whole or se:.2f} degrees, over {largest_error:g}")
-    if not 5.0 <= mean <= 60.0:
-        yield Doubt("range", f"{mean:.1f} degrees, outside 5 to 60")
+    if not usual[0] <= mean <= usual[1]:
+        yield Doubt("range", f"{mean:.1f} degrees, outside {usual[0]:g} to {usual[1]:g}")
 
 
 def doubts_of(

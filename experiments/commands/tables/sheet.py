@@ -30,13 +30,6 @@ LETTER = re.compile(r"^[A-Z]: ?(?=.)")
 LEVELS = re.compile(r"(?P<low>[-+.\deE]+)\s*\.\.\s*(?P<high>[-+.\deE]+)\s*(?P<unit>.*)")
 
 
-class _Any(tuple[str, ...]):
-    """Columns of a table that may have any."""
-
-    def __contains__(self, name: object) -> bool:
-        return True
-
-
 @dataclass(frozen=True)
 class Columns:
     """Columns of a table, as the options of a command name them."""
@@ -124,7 +117,7 @@ def read_mixture(path: Path, responses: Sequence[str]) -> tuple[Mixture, pd.Seri
 
 def read_frame(path: Path) -> tuple[pd.DataFrame, list[Row]]:
     """Return a table's cells as texts, and its rows with their places."""
-    rows = list(read_rows(path, (), _Any()))
+    rows = list(read_rows(path, (), None))
     return pd.DataFrame([{n: row[n] for n in rows[0].cells if n} for row in rows]), rows
 
 

@@ -92,15 +92,13 @@ def _loaded(path: Path) -> tuple[Corners, Faces | None]:
 
 def _cleaned(corners: Corners, faces: Faces) -> tuple[Corners, Faces]:
     """Weld corners by position; drop empty and doubled triangles."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
+    from trimesh.graph import connected_component_labels
 
     places, own = np.unique(corners, axis=0, return_inverse=True)
     near = cKDTree(places).query_pairs(WELDED * float(np.ptp(places, axis=0).max()), output_type="ndarray")
-    links = coo_array((np.ones(len(near)), near.T), shape=(len(places), len(places)))
-    count, welded = connected_components(links, directed=False)
-    middles = np.zeros((count, 3))
+    welded = connected_component_labels(near, len(places))
+    middles = np.zeros((welded.max() + 1, 3))
     middles[welded] = places
     faces = welded[own.ravel()[faces]]
     distinct = faces[[len(set(face)) == 3 for face in faces.tolist()]]
@@ -119,25 +117,18 @@ def _edges(faces: Faces) -> tuple[Faces, Faces]:
     return np.unique(pairs, axis=0, return_counts=True)
 
 
-def _places(corners: Corners, edges: Faces) -> tuple[int, Faces, Corners]:
-    """Return the number of groups of connected edges, the group of each, and its ends."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    links = coo_array((np.ones(len(edges)), edges.T), shape=(len(corners), len(corners)))
-    groups, own = np.unique(connected_components(links, directed=False)[1][edges[:, 0]], return_inverse=True)
-    return len(groups), own, corners[edges]
-
-
 def _closed(path: Path, corners: Corners, faces: Faces, unit: float) -> Trimesh:
     """Build a closed surface; raise `InputError` with its open edges."""
+    import trimesh
+
     edges, counts = _edges(faces)
     for wrong, finding, name, hint in (
         (counts > 2, "has inner walls", "edges of three triangles or more", "Remove them in a mesh program."),
         (counts == 1, "is open", "open edges", "Close the hole in a mesh program (in MeshLab: Close Holes)."),
     ):
         if wrong.any():
-            places, own, ends = _places(corners, edges[wrong])
+            own = trimesh.graph.connected_component_labels(edges[wrong])[edges[wrong, 0]]
+            places, ends = len(np.unique(own)), corners[edges[wrong]]
             length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
             x, y, z = ends[own == np.bincount(own).argmax()].mean(axis=(0, 1))
             at = "around" if places == 1 else f"at {places} places, most of them around"
@@ -146,8 +137,6 @@ def _closed(path: Path, corners: Corners, faces: Faces, unit: float) -> Trimesh:
                 "in the file's unit"
             )
             raise InputError(str(path), f"the surface {finding}", found, hint)
-    import trimesh
-
     with TemporaryDirectory() as folder:  # the reader turns the faces outward, and checks the volume
         copy = Path(folder) / "surface.off"
         size = float(np.ptp(corners, axis=0).max())

@@ -23,11 +23,9 @@ def _is_xyz(head: str) -> bool:
 
 
 def _is_mercury(head: str) -> bool:
-    first, second, *_ = [
-        [*line.split(), *([""] * (not line.split()))] for line in [*head.splitlines()[:2], "", ""]
-    ]
-    numbers = all(is_number(cell) for cell in (*first, *second))
-    return numbers and (len(first), len(second)) == (MERCURY_HEAD, MERCURY_ROW) and first[0].isdigit()
+    first, second = (line.split() for line in [*head.splitlines()[:2], "", ""][:2])
+    is_frame = (len(first), len(second)) == (MERCURY_HEAD, MERCURY_ROW)
+    return is_frame and first[0].isdigit() and all(map(is_number, first + second))
 
 
 def _columns_of(line: str, path: Path) -> Columns:

@@ -57,15 +57,14 @@ def _frames(path: Path) -> Iterator[_Frame]:
             if not line.startswith("ITEM:"):
                 rows.append(line.rstrip("\n"))
                 continue
-            words = line.split()[1:]
-            rows = []
-            name, columns = _item(words)
+            item, rows = " ".join(line.split()[1:]), []
+            name = next((each for each in ITEMS.values() if f"{item} ".startswith(f"{each} ")), item)
+            columns = item.removeprefix(name).split()
             if name in frame.items:
                 yield frame
                 frame = _Frame(number, {key: frame.items[key] for key in ("UNITS",) if key in frame.items})
             frame.items[name] = rows
-            if name in ("ATOMS", "BOX BOUNDS"):
-                frame.items[f"{name} columns"] = columns
+            frame.items[f"{name} columns"] = columns
             if name == "ATOMS":
                 frame.columns, frame.first_row = columns, number + 1
     yield frame
@@ -99,15 +98,6 @@ def _yaml_frames(path: Path) -> Iterator[_Frame]:
 
 def _cells(row: str) -> list[str]:
     return row.translate(str.maketrans("[],", "   ")).split()
-
-
-def _item(words: list[str]) -> tuple[str, list[str]]:
-    """Split an item into its name and the words after it."""
-    for name in ("ATOMS", "BOX BOUNDS", "NUMBER OF ATOMS"):
-        length = len(name.split())
-        if words[:length] == name.split():
-            return name, words[length:]
-    return " ".join(words), []
 
 
 def _read(path: Path, frames: Callable[[Path], Iterator[_Frame]] = _frames) -> SphereFile:

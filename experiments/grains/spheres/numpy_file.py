@@ -36,11 +36,9 @@ def _read(path: Path) -> SphereFile:
     types = next((arrays[name] for name in TYPES if name in arrays), None)
     if types is not None and np.shape(types) != table.shape[:1]:
         raise InputError(str(path), "needs a type for each sphere", f"{np.shape(types)} for {len(table)}")
-    rows = (
-        (n, [*(repr(float(value)) for value in row), "" if types is None else str(types[n])])
-        for n, row in enumerate(table)
-    )
-    columns = Columns(0, 1, 2, 3, type=None if types is None else 4)
+    columns, kinds = Columns(0, 1, 2, 3, type=None if types is None else 4), () if types is None else types
+    cells = enumerate(table.astype(np.float64).astype(object))
+    rows = ((n, [*map(str, row), *map(str, kinds[n : n + 1])]) for n, row in cells)
     return spheres_of("NumPy file", rows, columns, path, kind="row")
 
 

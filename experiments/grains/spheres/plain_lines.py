@@ -19,9 +19,10 @@ from experiments.io.errors import InputError
 from experiments.io.texts import delimiter_of, is_number, split
 from experiments.io.units import UNITS
 
-_COLUMNS = re.compile(r"\bx,? y,? z,? r\b")
 _DIAMETERS = re.compile(r"^[ \t]*#.*\bx[,; \t]+y[,; \t]+z[,; \t]+d", re.MULTILINE | re.IGNORECASE)
-_NAMED_UNIT = re.compile(rf"\bin ({'|'.join(UNITS['length'])})\b")
+_NAMED_UNIT = re.compile(
+    rf"^[ \t]*#(?>.*?\bx,? y,? z,? r\b).*?\bin ({'|'.join(UNITS['length'])})\b", re.MULTILINE
+)
 """Unit in a comment of dem-warp, after the names of the columns."""
 
 
@@ -48,16 +49,8 @@ def _read(path: Path) -> SphereFile:
     if columns.is_diameter:
         description = "spheres (x y z d, by a comment)"
     read = spheres_of(description, rows, columns, path, delimiter)
-    return replace(read, unit=_named_unit(text))
-
-
-def _named_unit(text: str) -> float | None:
-    """Size of the unit in a comment [m], or None."""
-    for line in text.splitlines():
-        columns = _COLUMNS.search(line) if line.lstrip().startswith("#") else None
-        if columns and (named := _NAMED_UNIT.search(line, columns.end())):
-            return UNITS["length"][named[1]]
-    return None
+    named = _NAMED_UNIT.search(text)
+    return replace(read, unit=UNITS["length"][named[1]] if named else None)
 
 
 PLAIN = Format("lines x y z r", _recognises, _read)

@@ -55,9 +55,7 @@ def _read(path: Path) -> SphereFile:
     body = next((name for name in BODIES if name in values), None)
     kind = next((name for name in values if name.replace("_", "") in TYPES), None)
     further = [np.ravel(values[name])[: len(points)] for name in (body, kind) if name is not None]
-    rows = (
-        (n, [repr(float(value)) for value in row]) for n, row in enumerate(np.column_stack([table, *further]))
-    )
+    rows = enumerate(row.astype(str).tolist() for row in np.column_stack([table, *further]))
     at = [None if name is None else 4 for name in (body, kind)]
     columns = Columns(0, 1, 2, 3, size in DIAMETERS, at[0], at[1] if body is None else at[1] and 5)
     return spheres_of(f"VTK file, radii from the array {arrays[size]}", rows, columns, path, kind="point")

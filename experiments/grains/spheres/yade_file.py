@@ -70,7 +70,7 @@ def _read_template(path: Path) -> SphereFile:
     if radii.ndim != 1 or centers.shape != (len(radii), 3):
         problem = "clumpTemplate needs a radius and a position (x, y, z) for each sphere"
         raise InputError(place, problem, f"shapes {radii.shape} and {centers.shape}")
-    rows = ((call.lineno, [repr(float(value)) for value in row]) for row in np.column_stack([centers, radii]))
+    rows = ((call.lineno, row.astype(str).tolist()) for row in np.column_stack([centers, radii]))
     description = "clump template of Yade (relative sizes: --unit is the size of 1)"
     return spheres_of(description, rows, Columns(0, 1, 2, 3), path)
 
