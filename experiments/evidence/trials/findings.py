@@ -24,11 +24,7 @@ OUTLINED = "outlined"
 
 _OUTLINE = tuple(each.name for each in OUTLINE)
 
-VIEWS = {
-    EVERYTHING: NAMES,
-    OUTLINED: (*NAMES, *_OUTLINE),
-    PHOTOGRAPHS: (*PHOTOGRAPHED, *_OUTLINE),
-}
+VIEWS = {EVERYTHING: NAMES, OUTLINED: (*NAMES, *_OUTLINE), PHOTOGRAPHS: (*PHOTOGRAPHED, *_OUTLINE)}
 """Observables that an analysis has, by its view; of a bank without outlines all have the others."""
 
 CRASH = "crash"

@@ -1,6 +1,7 @@
 """Problems of the verification: each is one file of `problems` and one line here."""
 
 from experiments.evidence.verification.check import Problem
+from experiments.evidence.verification.problems.bench import bench
 from experiments.evidence.verification.problems.beverloo import beverloo, coned
 from experiments.evidence.verification.problems.deme_contacts import deme_contacts
 from experiments.evidence.verification.problems.energy import energy
@@ -43,6 +44,7 @@ PROBLEMS: dict[str, Problem] = {
     "pressed": pressed,
     "penetrated": penetrated,
     "sheared": sheared,
+    "bench": bench,
     "single-grains": single_grains,
     "stability": stability,
 }
@@ -50,6 +52,6 @@ PROBLEMS: dict[str, Problem] = {
 PEERS = ("liggghts-contacts", "liggghts-clumps", "lammps-contacts", "yade-contacts", "deme-contacts")
 """Problems that run another code, which must be installed."""
 
-BENCH = ("released", "pressed", "penetrated", "sheared")
+BENCH = ("released", "pressed", "penetrated", "sheared", "bench")
 HEAVY = ("beverloo", "coned", "heap-angle", "stability", *BENCH, *PEERS)
 """Problems that run only when they are named: minutes on a GPU, up to hours on two cores, or another code."""

@@ -85,12 +85,7 @@ def without_heap(source: int | Path) -> tuple[Row, Picture]:
     else:
         seed, (kind, picture) = str(source), picture_without_heap(source)
     outcome, angle, why = measured(picture)
-    row: Row = {
-        "kind": kind,
-        "seed": seed,
-        "outcome": outcome,
-        "why": why,
-    }
+    row: Row = {"kind": kind, "seed": seed, "outcome": outcome, "why": why}
     if angle is not None:
         row |= {"mean": angle.mean, "se": angle.se}
     return row, picture

@@ -6,14 +6,7 @@ import numpy as np
 
 from experiments.evidence.accuracy.photographs.phone_camera import PhoneCamera
 from experiments.evidence.accuracy.photographs.photographed_heaps import GrainHeap
-from experiments.evidence.accuracy.photographs.rendering import (
-    Color,
-    Lamp,
-    Phone,
-    Surroundings,
-    Top,
-    render,
-)
+from experiments.evidence.accuracy.photographs.rendering import Color, Lamp, Phone, Surroundings, Top, render
 from imaging import ReposeAngle, find_outline, measure, silhouette
 from imaging.geometry import FloatArray, Picture
 

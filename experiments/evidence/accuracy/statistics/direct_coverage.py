@@ -12,13 +12,7 @@ from scipy import special
 from doe import FactorSurface, Goal, Sample, StatedValue, fit_surface, joint_fit
 from doe.samples.simultaneous import Simultaneous
 from doe.samples.two_errors import TwoErrors
-from experiments.evidence.accuracy.statistics.coverage import (
-    AT_LEAST,
-    EXACT,
-    Figure,
-    generator,
-    require_same,
-)
+from experiments.evidence.accuracy.statistics.coverage import AT_LEAST, EXACT, Figure, generator, require_same
 from experiments.evidence.accuracy.statistics.surface_coverage import (
     DESIGN,
     HAT,
