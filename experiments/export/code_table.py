@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
@@ -15,6 +15,7 @@ from experiments.export.contact import Contact, Term, contacts_of, values
 from experiments.export.exporter import ExportedTest, Exporter, Translation
 from experiments.export.laws import LawsOfCode, Translated, mechanism_warnings
 from experiments.export.lift import Lift
+from experiments.export.lift_rows import lift_warnings
 
 Numbers = Callable[[Contact], Mapping[str, float]]
 """Values of the terms of a contact that are no attribute of it, by their keys in the table."""
@@ -48,6 +49,14 @@ class CodeTest:
     def contact_values(self) -> list[dict[str, float]]:
         """Terms of the contacts by name."""
         return [values(self.exporter.contact_terms(contact)) for contact in self.contacts]
+
+    def script(
+        self, program: str, files: Mapping[str, str], heap: str, rows: Iterable[Translated], *warnings: str
+    ) -> Translation:
+        """Return the translation whose first file a program runs; rows and warnings follow those of laws."""
+        main, warned = next(iter(files)), (*self.warnings, *lift_warnings(self.lift), *warnings)
+        translated = (*self.rows, *rows, *self.notes)
+        return Translation(files, main, (program, "-in", main), heap, translated, warned)
 
 
 def code_exporter(

@@ -6,43 +6,20 @@ import math
 
 import numpy as np
 
+from experiments.export import lammps_text, liggghts_text
 from experiments.export.hopper_text import FILLED_FILE
 from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift, disc, prism, stl_text
 from experiments.export.lift_rows import end_rows, filling_rows
 
-TURNED_FILE = "turned.dump"
-"""Dump of the turning drum, with a frame for each look."""
+DRUM, TURNED_FILE = "drum.in", "turned.dump"
+"""Main file, and dump of the turning drum, with a frame for each look."""
 
 SHELL_SIDES = 180
 """Sides of the prism around the shell; its edges are 0.02 % of the radius outside the cylinder."""
 
 LOOKS = 250
 """Most looks at the turning drum, so that the dump stays small."""
-
-# a primitive ycylinder of LIGGGHTS 3.8 with shear moves towards the grains where it should turn
-_LIGGGHTS_WALLS = """\
-fix shell all mesh/surface file shell.stl type 2
-fix front all mesh/surface file front.stl type 3
-fix back all mesh/surface file back.stl type 3
-fix walls all wall/gran model {model} mesh n_meshes 3 meshes shell front back
-
-fix {bodies}
-"""
-
-_LIGGGHTS_TURN = """
-# turn, and after the start-up look at the grains
-dump filled all custom 1 {filled} id {body} x y z radius
-dump_modify filled sort id format "%d %d %.9g %.9g %.9g %.9g"
-run 0
-undump filled
-{moves}run {start_up}
-dump looks all custom {look} looks.txt id {body} x y z radius
-dump_modify looks sort id format "%d %d %.7g %.7g %.7g %.9g"
-run {turn}
-undump looks
-shell mv looks.txt {turned}
-"""
 
 _LIGGGHTS_MOVE = """\
 fix turn_{wall} all move/mesh mesh {wall} rotate origin 0 0 {radius:.9g} axis 0 1 0 period {period:.9g}
@@ -56,15 +33,17 @@ region drum cylinder y 0 {radius:.9g} {radius:.9g} -{half:.9g} {half:.9g} &
 fix drum all wall/gran/region granular {words} region drum
 """
 
-_LAMMPS_TURN = """
-# turn, and after the start-up look at the grains
-write_dump all custom {filled} id {body} x y z radius modify sort id format float %.9g
+_LAMMPS_MOVE = """\
 variable begin equal step
 variable start equal ${{begin}}
 variable turn equal "(step - v_start) * {step_turn:.12g}"
-run {start_up}
+"""
+
+_TURN = """
+# turn, and after the start-up look at the grains
+{opening}run {start_up}
 dump looks all custom {look} looks.txt id {body} x y z radius
-dump_modify looks sort id format float %.7g
+dump_modify looks sort id format {form}
 run {turn}
 undump looks
 shell mv looks.txt {turned}
@@ -73,6 +52,7 @@ shell mv looks.txt {turned}
 
 def drum_meshes(lift: Lift) -> dict[str, str]:
     """Return the files of the shell and the two ends, which reach beyond its corners."""
+    # a primitive ycylinder of LIGGGHTS 3.8 with shear moves towards the grains where it should turn
     radius, length = lift.scene.diameter / 2, lift.scene.length
     shell = prism(radius, length, SHELL_SIDES)
     end = disc(radius / math.cos(math.pi / SHELL_SIDES), SHELL_SIDES)
@@ -82,18 +62,13 @@ def drum_meshes(lift: Lift) -> dict[str, str]:
     return {f"{name}.stl": stl_text(name, first + each) for name, each in along_y.items()}
 
 
-def liggghts_drum(lift: Lift, model: str) -> str:
-    """Write the walls of the drum at rest for LIGGGHTS."""
-    bodies = "motion all nve/sphere" if lift.is_of_spheres else "bodies all multisphere"
-    return _LIGGGHTS_WALLS.format(model=model, bodies=bodies)
-
-
 def liggghts_turning(lift: Lift) -> str:
     """Write the turn of the filled drum for LIGGGHTS."""
     drum, body = lift.scene, "type" if lift.is_of_spheres else "id_multisphere"
     numbers = {"radius": drum.diameter / 2, "period": 1.0 / drum.rotation_rate}
     moves = "".join(_LIGGGHTS_MOVE.format(wall=wall, **numbers) for wall in ("shell", "front", "back"))
-    return _LIGGGHTS_TURN.format(moves=moves, body=body, **_phases(lift))
+    filled = liggghts_text.dump("filled", FILLED_FILE, body)
+    return _turning(lift, filled + moves, body, '"%d %d %.7g %.7g %.7g %.9g"')
 
 
 def lammps_drum(lift: Lift, words: str) -> str:
@@ -104,24 +79,25 @@ def lammps_drum(lift: Lift, words: str) -> str:
 def lammps_turning(lift: Lift) -> str:
     """Write the turn of the filled drum for LAMMPS."""
     body, step_turn = "type" if lift.is_of_spheres else "mol", lift.scene.spin * lift.case.time_step
-    return _LAMMPS_TURN.format(body=body, step_turn=step_turn, **_phases(lift))
+    filled = lammps_text.dump(FILLED_FILE, f"id {body}")
+    return _turning(lift, filled + _LAMMPS_MOVE.format(step_turn=step_turn), body, "float %.7g")
 
 
-def _phases(lift: Lift) -> dict[str, object]:
-    """Return the steps of the phases and of a look, and the names of the dumps."""
+def _turning(lift: Lift, opening: str, body: str, form: str) -> str:
     drum = lift.scene
     window = drum.revolutions / drum.rotation_rate
     look = lift.steps(max(LOOK, window / LOOKS))
     # the first look may begin the measuring, and the last must not come before its end
     looks = math.ceil(window / (look * lift.case.time_step)) + 2
-    start_up = lift.steps(drum.start_up / drum.rotation_rate)
-    return {
-        "filled": FILLED_FILE,
-        "turned": TURNED_FILE,
-        "look": look,
-        "start_up": start_up,
-        "turn": looks * look,
-    }
+    return _TURN.format(
+        opening=opening,
+        start_up=lift.steps(drum.start_up / drum.rotation_rate),
+        look=look,
+        body=body,
+        form=form,
+        turn=looks * look,
+        turned=TURNED_FILE,
+    )
 
 
 def drum_rows(lift: Lift, exact: bool = False) -> tuple[Translated, ...]:

@@ -12,14 +12,22 @@ from dem_warp import Drum, Hopper, LiftedCylinder
 from experiments.export import lammps_text as text
 from experiments.export.code_table import CodeTest, code_exporter, code_laws
 from experiments.export.contact import Contact, values
-from experiments.export.drum import TURNED_FILE, drum_rows, lammps_drum, lammps_turning
+from experiments.export.drum import DRUM, TURNED_FILE, drum_rows, lammps_drum, lammps_turning
 from experiments.export.exporter import Translation
 from experiments.export.hopper_text import DISCHARGE_FILE, HOPPER, WEIGHED
 from experiments.export.lammps_hopper import hopper_opening, hopper_rows, hopper_walls
 from experiments.export.laws import Translated
 from experiments.export.lift import LOOK, Lift, Template
-from experiments.export.lift_rows import lift_rows, lift_warnings
-from experiments.export.script_text import HEAP_FILE, clear_loop, fill_loop, rest_loop, space_words, watched
+from experiments.export.lift_rows import lift_rows
+from experiments.export.script_text import (
+    HEAP_FILE,
+    clear_loop,
+    fill_loop,
+    filling,
+    rest_loop,
+    space_words,
+    watched,
+)
 
 INPUT = "lift.in"
 
@@ -61,22 +69,12 @@ _FILL_TO_RIM = """
 {loop}region above block INF INF INF INF {strike:.6g} INF
 """
 
-_FILL_COUNT = """
-# until all grains are in
-run {steps}
-unfix rain
-"""
-
 _LIFT = """
 # lift, until the tube is clear of the heap
 variable begin equal step
 variable start equal ${{begin}}
 variable rise equal "(step - v_start) * {step_rise:.12g}"
 {loop}"""
-
-_END = f"""
-write_dump all custom {HEAP_FILE} id type x y z radius modify sort id format float %.9g
-"""
 
 
 def contact_numbers(contact: Contact) -> dict[str, float]:
@@ -123,17 +121,16 @@ def translate(test: CodeTest) -> Translation:
         return _hopper(test)
     if isinstance(lift.scene, Drum):
         return _drum(test)
-    files = {INPUT: _setup(test, *_lift_walls(test)) + _filling(lift) + _lifting(lift), **_molecules(lift)}
+    files = {INPUT: _setup(test, *_lift_walls(test)) + _lifting(lift), **_molecules(lift)}
     tilted = ("scene tilt: LAMMPS pours along gravity alone; left out",) if lift.scene.tilt else ()
     upright = f"(0, 0, -{_gravity(lift):.4g}) m/s2"
     rows = (
         replace(row, there=upright) if tilted and row.subject == "gravity" else row
         for row in lift_rows(lift, exact_tube=True)
     )
-    warnings = test.warnings + lift_warnings(lift) + tilted
     bodies = "`fix nve/sphere`" if lift.is_of_spheres else "`fix rigid/small`, mass and inertia given"
-    translated = (*test.rows, *rows, Translated("grains", "clumps, rigid", bodies), *test.notes)
-    return Translation(files, INPUT, ("lmp", "-in", INPUT), HEAP_FILE, translated, warnings)
+    translated = (*rows, Translated("grains", "clumps, rigid", bodies))
+    return test.script("lmp", files, HEAP_FILE, translated, *tilted)
 
 
 def _hopper(test: CodeTest) -> Translation:
@@ -141,20 +138,17 @@ def _hopper(test: CodeTest) -> Translation:
     bin_words, floor_words = (granular_words(contact, test.words) for contact in test.contacts[1:])
     walls = hopper_walls(lift, bin_words, floor_words) + _fallen(lift)
     setup = _setup(test, walls, _sides(lift, _below(lift)), WEIGHED)
-    files = {HOPPER: setup + _filling(lift) + hopper_opening(lift), **_molecules(lift)}
-    rows, warnings = (*test.rows, *hopper_rows(lift), *test.notes), test.warnings + lift_warnings(lift)
-    return Translation(files, HOPPER, ("lmp", "-in", HOPPER), DISCHARGE_FILE, rows, warnings)
+    files = {HOPPER: setup + hopper_opening(lift), **_molecules(lift)}
+    return test.script("lmp", files, DISCHARGE_FILE, hopper_rows(lift))
 
 
 def _drum(test: CodeTest) -> Translation:
-    lift, input = test.lift, "drum.in"
+    lift = test.lift
     x, y, bottom = lift.scene.room(lift.reach)
     walls = lammps_drum(lift, granular_words(test.contacts[1], test.words))
     setup = _setup(test, walls, (-x, x, -y, y, bottom, lift.scene.diameter - bottom))
-    files = {input: setup + _filling(lift) + lammps_turning(lift), **_molecules(lift)}
-    rows = (*test.rows, *drum_rows(lift, exact=True), *test.notes)
-    warnings = test.warnings + lift_warnings(lift)
-    return Translation(files, input, ("lmp", "-in", input), TURNED_FILE, rows, warnings)
+    files = {DRUM: setup + lammps_turning(lift), **_molecules(lift)}
+    return test.script("lmp", files, TURNED_FILE, drum_rows(lift, exact=True))
 
 
 def _molecules(lift: Lift) -> dict[str, str]:
@@ -211,6 +205,7 @@ def _setup(test: CodeTest, walls: str, sides: Sequence[float], watch: str = "") 
         else text.BODY_NUMBERS + text.rigid_bodies(upright),
         _rain(lift, lift.rain_bottom + lift.rain_height),
         watched(lift, more=watch),
+        _filling(lift),
     ]
     return "".join(parts)
 
@@ -279,21 +274,18 @@ def _molecule_radius(template: Template) -> float:
 
 
 def _filling(lift: Lift) -> str:
-    settle = rest_loop(lift, "settle", text.QUIT)
-    if lift.scene.grain_count is not None:
-        insertions = math.ceil(lift.count / grains_at_once(lift))
-        time = max(lift.count / lift.rain_rate + 2.0 * lift.rain_period, insertions * _fall_time(lift))
-        return _FILL_COUNT.format(steps=lift.steps(time)) + settle
-    above = f"delete_atoms region above compress no{'' if lift.is_of_spheres else ' mol yes'}\n"
+    insertions = math.ceil(lift.count / grains_at_once(lift))
+    time = max(lift.count / lift.rain_rate + 2.0 * lift.rain_period, insertions * _fall_time(lift))
     loop = fill_loop(lift, f"{lift.steps(LOOK)} pre no post no", text.QUIT)
-    return _FILL_TO_RIM.format(loop=loop, strike=lift.strike) + above + settle + above
+    to_rim = _FILL_TO_RIM.format(loop=loop, strike=lift.strike)
+    return filling(lift, text.QUIT, lift.steps(time), to_rim, "" if lift.is_of_spheres else " mol yes")
 
 
 def _lifting(lift: Lift) -> str:
     scene, looks = lift.scene, max(round(lift.scene.lift_time / LOOK), 1)
     loop = clear_loop(lift.steps(LOOK), looks, lift.largest_radius)
     lifting = _LIFT.format(step_rise=lift.case.time_step * scene.lift_speed, loop=loop)
-    return lifting + rest_loop(lift, "rest", text.QUIT) + _END
+    return lifting + rest_loop(lift, "rest", text.QUIT) + "\n" + text.dump(HEAP_FILE)
 
 
 def tsuji_restitution(damping: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.export.hopper_text import FILLED_FILE, bin_top, discharge, part_rows, sums
-from experiments.export.lammps_text import QUIT
+from experiments.export.lammps_text import QUIT, dump
 from experiments.export.laws import Translated
 from experiments.export.lift import Lift
 from experiments.io.errors import InputError
@@ -47,10 +47,7 @@ def hopper_walls(lift: Lift, bin_words: str, floor_words: str) -> str:
 
 def hopper_opening(lift: Lift) -> str:
     """Write the opening and the discharge, until rest."""
-    body = "" if lift.is_of_spheres else " mol"
-    filled = (
-        f"write_dump all custom {FILLED_FILE} id{body} type x y z radius modify sort id format float %.9g\n"
-    )
+    filled = dump(FILLED_FILE, "id type" if lift.is_of_spheres else "id mol type")
     return discharge(lift, filled, "unfix plug\n", QUIT)
 
 

@@ -92,6 +92,11 @@ def rigid_bodies(gravity: Sequence[float], bodies: str = "mol grains") -> str:
     return _BODIES.format(weight=weight(gravity, "nothing"), bodies=bodies)
 
 
+def dump(file: str, columns: str = "id type") -> str:
+    """Write the spheres into a file, with columns before their places and radii."""
+    return f"write_dump all custom {file} {columns} x y z radius modify sort id format float %.9g\n"
+
+
 def written_shares(fractions: Sequence[float]) -> list[str]:
     """Write parts that add up to 1 within LAMMPS' tolerance."""
     return [f"{fraction:.15g}" for fraction in (*fractions[:-1], 1.0 - sum(fractions[:-1]))]

@@ -244,10 +244,7 @@ def shell(low_corner: float, high_corner: float, height: float, sides: int = SID
 
 def disc(radius: float, sides: int = SIDES) -> np.ndarray:
     """Return the triangles of a regular polygon at z = 0 with the area of a disc [m], (sides, 3, 3)."""
-    turns = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
-    corner = disc_corner(radius, sides)
-    rim = np.column_stack([corner * np.cos(turns), corner * np.sin(turns), np.zeros(sides)])
-    return np.stack([np.zeros_like(rim), rim, np.roll(rim, -1, axis=0)], axis=1)
+    return shell(disc_corner(radius, sides), 0.0, 0.0, sides)[:sides, [2, 0, 1]]
 
 
 def disc_corner(radius: float, sides: int = SIDES) -> float:

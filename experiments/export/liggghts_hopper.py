@@ -7,28 +7,13 @@ import math
 import numpy as np
 
 from dem_warp.scenes.hopper import DEPTH
-from experiments.export.hopper_text import FILLED_FILE, bin_top, discharge, part_rows, sums
+from experiments.export.hopper_text import FILLED_FILE, bin_top, discharge, part_rows
 from experiments.export.laws import Translated
 from experiments.export.lift import SIDES, Lift, disc, disc_corner, shell, stl_text
+from experiments.export.liggghts_text import dump
 
 FALL = DEPTH + 2.0
 """Fall of the plug over the bounding radius of the grains, as in our own hopper."""
-
-_WALLS = """\
-fix bin all mesh/surface file bin.stl type 2
-fix floor all mesh/surface file floor.stl type 3
-fix plug all mesh/surface file plug.stl type 3
-fix walls all wall/gran model {model} mesh n_meshes 3 meshes bin floor plug
-
-fix {bodies}
-"""
-
-_FILLED = f"""\
-dump filled all custom 1 {FILLED_FILE} id {{body}} x y z radius
-dump_modify filled sort id format "%d %d %.9g %.9g %.9g %.9g"
-run 0
-undump filled
-"""
 
 _FALL = """\
 fix fall all move/mesh mesh plug linear 0 0 -{speed:.9g}
@@ -60,12 +45,6 @@ def hopper_room(lift: Lift) -> tuple[float, float]:
     return max(lift.scene.room(reach)[0], 1.5 * lift.scene.outlet + 3.0 * reach), -(FALL + 2.0) * reach
 
 
-def hopper_walls(lift: Lift, model: str) -> str:
-    """Write the walls, and the sums that are weighed."""
-    bodies = "motion all nve/sphere" if lift.is_of_spheres else "bodies all multisphere"
-    return _WALLS.format(model=model, bodies=bodies) + sums(lift)
-
-
 def hopper_opening(lift: Lift, quit: str) -> str:
     """Write the opening and the discharge, until rest."""
     speed = lift.scene.top_speed
@@ -74,7 +53,7 @@ def hopper_opening(lift: Lift, quit: str) -> str:
         fall=lift.steps(FALL * lift.reach / speed),
         aside=lift.steps((lift.scene.outlet + lift.reach) / speed),
     )
-    filled = _FILLED.format(body="type" if lift.is_of_spheres else "id_multisphere")
+    filled = dump("filled", FILLED_FILE, "type" if lift.is_of_spheres else "id_multisphere")
     return discharge(lift, filled, fall, quit)
 
 

@@ -39,6 +39,13 @@ fix rain all insert/rate/region seed {rain_seed} distributiontemplate sizes &
 
 """
 
+_DUMP = """\
+dump {name} all custom 1 {file} id {body} x y z radius
+dump_modify {name} sort id format "%d %d %.9g %.9g %.9g %.9g"
+run 0
+undump {name}
+"""
+
 _ORDER = ("normal", "tangential_history", "cohesion", "rolling", "tangential_damping", "attraction")
 """Order in which LIGGGHTS wants the words of its model."""
 
@@ -106,6 +113,11 @@ def grain_template(number: int, template: Template, seed: int, atom_type: int = 
         f"    type {number} mass {template.mass:.9g} &\n"
         f"    inertia_tensor {xx:.9g} 0 0 {yy:.9g} 0 {zz:.9g} use_density"
     )
+
+
+def dump(name: str, file: str, body: str = "type") -> str:
+    """Write the spheres into a file, with their type or the number of their body."""
+    return _DUMP.format(name=name, file=file, body=body)
 
 
 def pouring(kinds: Sequence[tuple[Template, float, int]], rain: Rain, seeds: Sequence[int]) -> str:

@@ -33,6 +33,12 @@ thermo {look}
 thermo_modify lost ignore norm no
 """
 
+_FILL_COUNT = """
+# until all grains are in
+run {steps}
+unfix rain
+"""
+
 _FILL = """\
 variable looks loop {looks}
 label fill
@@ -130,6 +136,18 @@ def fill_loop(lift: Lift, run: str, quit: str) -> str:
         limit=lift.fill_limit,
         quit=quit,
     )
+
+
+def filling(lift: Lift, quit: str, steps: int, to_rim: str, whole: str = "") -> str:
+    """Write the filling, until rest: the steps that a number of grains needs, or the text of one to the rim.
+
+    `whole` are the words that strike off all spheres of a grain.
+    """
+    settle = rest_loop(lift, "settle", quit)
+    if lift.scene.grain_count is not None:
+        return _FILL_COUNT.format(steps=steps) + settle
+    above = f"delete_atoms region above compress no{whole}\n"
+    return to_rim + above + settle + above
 
 
 def clear_loop(look: int, looks: int, clearance: float, rise: str = "") -> str:

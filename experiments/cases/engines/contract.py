@@ -17,7 +17,8 @@ import numpy as np
 from dem_warp import Case, CaseResult, GrainPopulation, Material
 from dem_warp.population import SIZE_LIMIT
 from experiments.cases.engines.program import AnswerError, empty_result
-from experiments.cases.engines.surfaces import stl_text, triangles_of
+from experiments.cases.engines.surfaces import triangles_of
+from experiments.export.lift import stl_text
 from experiments.grains.spheres import SphereFile, read_spheres
 from experiments.io.errors import InputError
 from experiments.io.files import write_text
@@ -197,7 +198,7 @@ def _walls(case: Case[Any], folder: Path) -> list[dict[str, Any]]:
     contacts, holds = scene.surfaces(case, len(walls))
     for number, wall in enumerate(walls):
         name = f"wall-{number + 1}.stl"
-        write_text(folder / name, stl_text(triangles_of(wall, half_width), f"wall-{number + 1}"))
+        write_text(folder / name, stl_text(f"wall-{number + 1}", triangles_of(wall, half_width)))
         contact = contacts[holds[number]]
         rows.append(
             {

@@ -18,10 +18,7 @@ from experiments.io.texts import read_text
 
 
 def discharge_result(case: Case[Any], folder: Path, provenance: dict[str, Any]) -> CaseResult:
-    """Read the filled hopper and its weighed discharge.
-
-    Raise AnswerError when a file is missing or malformed.
-    """
+    """Read the filled hopper and its weighed discharge; raise AnswerError for a malformed file."""
     spheres, grains = read_heap(folder / FILLED_FILE)
     looks = _looks(folder / DISCHARGE_FILE)
     since, mass, over, stay = looks.T
@@ -57,8 +54,6 @@ def discharge_result(case: Case[Any], folder: Path, provenance: dict[str, Any]) 
 
 def _looks(path: Path) -> np.ndarray:
     """Return time [s], mass [kg] and the two numbers of grains of each look, (n, 4)."""
-    if not path.is_file():
-        raise AnswerError(f"the program wrote no {path.name}")
     try:
         looks = np.array([line.split() for line in read_text(path).splitlines()[1:]], dtype=float)
     except ValueError as error:

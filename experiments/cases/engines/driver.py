@@ -16,6 +16,7 @@ from dem_warp.provenance import source_meaning
 from experiments.cases.engines.contract import heap_result, read_heap
 from experiments.cases.engines.discharge_files import discharge_result
 from experiments.cases.engines.drum_files import drum_result
+from experiments.cases.engines.program import AnswerError
 from experiments.export import EXPORTERS, ExportedTest, Translation, export_input
 from experiments.export.hopper_text import FILLED_FILE
 from experiments.io.errors import InputError
@@ -58,13 +59,16 @@ class Driver:
 
     def read(self, case: Case, folder: Path) -> CaseResult:
         """Read the spheres of the heap, the weighed discharge of a hopper, or the looks at a drum."""
-        made_by = {"program": EXPORTERS[self.name].code}
-        if isinstance(case.scene, Drum):
-            return drum_result(case, folder, made_by)
-        if not case.scene.leaves_a_heap:
-            return discharge_result(case, folder, made_by)
-        [heap] = self.answers(case)
-        return heap_result(*read_heap(folder / heap), {}, made_by)
+        made_by, files = {"program": EXPORTERS[self.name].code}, self.answers(case)
+        if missing := [name for name in files if not (folder / name).is_file()]:
+            raise AnswerError(f"the program wrote no {missing[0]}")
+        if case.scene.leaves_a_heap:
+            return heap_result(*read_heap(folder / files[0]), {}, made_by)
+        result = drum_result if isinstance(case.scene, Drum) else discharge_result
+        try:
+            return result(case, folder, made_by)
+        except InputError as error:
+            raise AnswerError(str(error).replace(f"{folder}/", "")) from error
 
     def _translation(self, case: Case) -> Translation:
         test = ExportedTest(self.name, case, "the case")

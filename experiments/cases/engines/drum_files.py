@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,32 +19,15 @@ from experiments.cases.engines.program import AnswerError, empty_result
 from experiments.export.drum import TURNED_FILE
 from experiments.export.hopper_text import FILLED_FILE
 from experiments.grains.spheres.lammps_dump import read_looks
-from experiments.io.errors import InputError
 
 
 def drum_result(case: Case[Any], folder: Path, provenance: dict[str, Any]) -> CaseResult:
     """Show the looks at another code's drum to the controller of ours, and return what it measures.
 
-    Raise AnswerError when a file is missing or malformed, or ends before the last look.
+    Raise InputError for a malformed file, AnswerError for one that ends before the last look.
     """
-    try:
-        return _watched(case, _looks(folder), provenance)
-    except InputError as error:
-        raise AnswerError(str(error).replace(f"{folder}/", "")) from error
-
-
-def _looks(folder: Path) -> Iterator[tuple[int, CaseResult]]:
-    """Yield the step and the grains of the filled drum, then of each look at the turning one."""
-    for name in (FILLED_FILE, TURNED_FILE):
-        if not (folder / name).is_file():
-            raise AnswerError(f"the program wrote no {name}")
-        for step, found in read_looks(folder / name):
-            yield step, heap_result(*grains_of(found), {}, {})
-
-
-def _watched(
-    case: Case[Any], looks: Iterator[tuple[int, CaseResult]], provenance: dict[str, Any]
-) -> CaseResult:
+    files = (read_looks(folder / name) for name in (FILLED_FILE, TURNED_FILE))
+    looks = ((step, heap_result(*grains_of(found), {}, {})) for file in files for step, found in file)
     step, filled = next(looks)
     # the other code has struck off what it found above the brim: all that is left counts
     counted = replace(case, scene=replace(case.scene, grain_count=len(filled.positions)))

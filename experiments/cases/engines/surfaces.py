@@ -35,19 +35,3 @@ def _across(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     x = np.cross(helper, axis)
     x /= np.linalg.norm(x)
     return x, np.cross(axis, x)
-
-
-def stl_text(triangles: np.ndarray, name: str) -> str:
-    """Write triangles [m], (n, 3, 3), as an STL file of text."""
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    lines = [f"solid {name}"]
-    for corners, normal in zip(triangles.tolist(), normals.tolist(), strict=True):
-        lines.append(f"facet normal {_numbers(normal)}\n outer loop")
-        lines += [f"  vertex {_numbers(corner)}" for corner in corners]
-        lines.append(" endloop\nendfacet")
-    return "\n".join([*lines, f"endsolid {name}", ""])
-
-
-def _numbers(values: list[float]) -> str:
-    return " ".join(f"{value:.9g}" for value in values)
