@@ -51,7 +51,6 @@ def bench(device: str) -> Result:
         relative_row((LABEL, "half the speed", *labels), usual.mean(), slow.mean(), 0.02),
         absolute_row((LABEL, "slow balls", "shear over normal stress", "literature"), 0.38, flow, 0.02),
         absolute_row((LABEL, "twice the adhesion", "cohesion", "linear"), 2.0, ratio, 2 * error),
-        absolute_row(),
         relative_row((LABEL, "poured", "speed [m/s]", "free fall"), speeds, np.max(falls, axis=0), 1e-3),
     )
     return Result(LABEL, TEXT, rows)
