@@ -161,7 +161,7 @@ HOSTILE = {
         {"s.toml": SMALL_STUDY + CONDITIONS, "m.csv": HEAD + "base,1,t75,400,ms\n"},
     ),
     "a plan without its data": small("discover s.toml none.csv --device cpu --dry-run", "none.csv"),
-    "no measurement": measured(HEAD, "m.csv", "no measured value"),
+    "no measurement": measured(HEAD, "m.csv", "has no rows"),
     "wrong column": measured(HEAD.replace("unit", "units"), "m.csv:1", "known column", "units"),
     "one unit wrong in every row": measured(
         HEAD + "".join(f"base,{n},flank_angle,30,mm\n" for n in range(1, 40)),
