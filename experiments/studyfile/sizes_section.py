@@ -62,6 +62,8 @@ class SizesSection(Section):
     diameter: Literal["sieve", "feret", "volume"] | None = None
     """Diameter that was measured: the side of the square opening that a grain just passes, its largest extent
     (Feret), or that of a sphere of its volume. Default: sieve of a sieve analysis, any of spheres."""
+    correction: Number = Field(default=1.0, gt=0.0)
+    """Number that all diameters are multiplied by. As a factor with a direct reading it is a table's error."""
     cut: tuple[Annotated[float, Field(ge=0.0, lt=1.0)], Annotated[float, Field(gt=0.0, le=1.0)]] = (
         0.01,
         0.99,
@@ -117,7 +119,7 @@ class SizesSection(Section):
         classes = self.cut_into_classes()
         middle = classes.mean_mass_diameter
         sizes = tuple(diameter / middle for diameter in classes.diameters)
-        scaled = shape.scaled(middle / self._diameter_of(shape))
+        scaled = shape.scaled(self.correction * middle / self._diameter_of(shape))
         return GrainPopulation.of_classes(scaled, material, SizeClasses(sizes, classes.fractions))
 
     def check_shape(self, shape: ClumpShape) -> None:

@@ -295,6 +295,35 @@ high = "4 mm"
     assert large / small == pytest.approx(4.0 / 3.0, rel=1e-9)
 
 
+def test_a_table_has_an_error_by_a_factor_that_scales_all_its_sizes(
+    write_study: WriteStudy, tmp_path: Path
+) -> None:
+    table(tmp_path, "opening,passing_percent\n3,0\n4,100\n")
+    section = '[grain.sizes]\nsieves = "sizes.csv"\nunit = "mm"\n'
+    reading = """
+[[factor]]
+name = "D"
+label = "true over measured diameter"
+parameter = "grain.sizes.correction"
+low = 0.9
+high = 1.1
+
+[[direct]]
+parameter = "grain.sizes.correction"
+by = "value"
+mean = 1.0
+sd = 0.02
+n = 1
+model_sd = 0.0
+"""
+    study = load_study(write_study((BEFORE_WALL, section + BEFORE_WALL), add=reading))
+    low, high = (study.case({"D": value}, seed=1).grains.mixture for value in (0.9, 1.1))
+    assert high.shapes[0].radii[0] / low.shapes[0].radii[0] == pytest.approx(1.1 / 0.9, rel=1e-9)
+    [direct] = study.direct
+    assert (direct.measured.mean, direct.model_sd) == (1.0, 0.0)
+    assert direct.measured.sd == pytest.approx(0.02)  # the reader rounds in float64
+
+
 def test_a_wrong_table_is_named_by_the_study_and_by_its_row(write_study: WriteStudy, tmp_path: Path) -> None:
     table(tmp_path, "opening,passing_percent\n1,30\n2,101\n")
     with pytest.raises(StudyError, match=r"sizes.csv:3: passing_percent: must be at most 100") as caught:
