@@ -214,7 +214,7 @@ def counts() -> list[Count]:
     own, statistics, pictures = (imports_between_rooms(name) for name in ("experiments", "doe", "imaging"))
     data = [name for name in tracked() if not name.endswith((".py", ".pyi"))]
     return [
-        Count("experiments without evidence, lines", lines(product), 35_029),
+        Count("experiments without evidence, lines", lines(product), 35_031),
         Count("experiments, folders without evidence", len(rooms), 15),
         Count("experiments, floors", max(heights(own).values()), 10),
         Count("experiments, imports between rooms", len(own), 65),
@@ -227,9 +227,9 @@ def counts() -> list[Count]:
             sum(circles_broken(pairs)[1] for pairs in (statistics, pictures)),
             0,
         ),
-        Count("installed, lines", lines(name for name in installed() if name.endswith(".py")), 68_896),
+        Count("installed, lines", lines(name for name in installed() if name.endswith(".py")), 68_898),
         Count("wheel [MB]", wheel_megabytes(), 1.5),
-        Count("tests, lines", lines(python_files("tests/")), 40_129),
+        Count("tests, lines", lines(python_files("tests/")), 40_158),
         Count("tracked data [MB]", megabytes(data), 16.0),
         Count("hard dependencies", len(hard_dependencies()), 18),
         Count("pairs of files with like code", len(like_code()), 150),
