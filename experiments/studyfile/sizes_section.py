@@ -63,7 +63,7 @@ class SizesSection(Section):
     """Diameter that was measured: the side of the square opening that a grain just passes, its largest extent
     (Feret), or that of a sphere of its volume. Default: sieve of a sieve analysis, any of spheres."""
     correction: Number = Field(default=1.0, gt=0.0)
-    """Number that all diameters are multiplied by: as a factor with a direct reading, the error of a table."""
+    """Number that all diameters are multiplied by. A factor with a direct reading, it is a table's error."""
     cut: tuple[Annotated[float, Field(ge=0.0, lt=1.0)], Annotated[float, Field(gt=0.0, le=1.0)]] = (
         0.01,
         0.99,
