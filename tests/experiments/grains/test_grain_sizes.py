@@ -285,7 +285,7 @@ def test_a_factor_may_vary_a_size_and_be_read(write_study: WriteStudy, key: str,
     reading = f'[[direct]]\nby = "value"\nmean = {low}\nsd = {low}\nn = 1\n{of}'
     section = SECTION if key != "median" else SECTION.replace('median = "3.6 mm"\n', "")
     study = load_study(write_study((BEFORE_WALL, section + BEFORE_WALL), add=f"\n{factor}\n{reading}"))
-    ends = study.factors[0].low, study.factors[0].high
+    ends = study.factors[-1].low, study.factors[-1].high
     small, large = (study.case({"D": end}, seed=1).grains.mixture.shapes[0].radii[0] for end in ends)
     assert large / small == pytest.approx(4.0 / 3.0, rel=1e-9)
     assert study.direct[0].measured.mean == pytest.approx(ends[0])
