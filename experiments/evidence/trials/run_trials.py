@@ -9,7 +9,6 @@ not ended.
 """
 
 import math
-import os
 import time
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from dem_warp.cores import cores
 from doe.discrepancy import fit_emulator
 from experiments.cases import Resources, open_workers
 from experiments.cases.store.outcome_table import OutcomeTable
@@ -81,7 +81,7 @@ def run_trials(
     with (
         open_workers(Resources(device, workers)) as simulators,
         EngineSimulator(search.study, search.library, table, simulators) as engine,
-        analysis_processes(begin, workers or os.cpu_count() or 1) as advance,
+        analysis_processes(begin, workers or cores()) as advance,
         noted_run(folder, f"analyses, {' and '.join(views)}", device, table),
     ):
         for turn in in_step(names, advance, TimedSimulator(engine, deadline)):

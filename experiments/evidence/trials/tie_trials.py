@@ -1,153 +1,156 @@
-"""The next experiment, in emulated ties: how often the proposed condition settles one, next to other choices.
+"""The next experiment, on fresh heaps of the engine: how often what the search proposes settles a tie.
 
-    python -m experiments.evidence.trials.tie_trials
-    python -m experiments.evidence.trials.tie_trials --fresh-runs 4 --count 50 --table out/ties-more.csv
+    python -m experiments.evidence.trials.generate_trials bank out/bank.npz --scale small --device cuda
+    python -m experiments.evidence.trials.tie_trials out/ties --bank out/bank.npz --device cuda
 
-The world is `emulated_world`; the search has a bank that is drawn from it, and fresh runs. Where it ends
-in a tie, each condition is repeated in turn, or every condition, in as many heaps in all as the search
-proposes, and searched again.
+Each twin has one of three hidden effects that look alike. The engine makes its heaps with the time step and
+the camera of the generator; the search has fresh runs. Where it ends in a tie, the heaps that it proposes are
+made with other seeds; one camera reads all heaps again, and they are searched as those of a new trial. What
+has ended is kept in the folder: the same command goes on.
 """
 
-import math
-from collections.abc import Iterator, Sequence
+import json
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache
-from itertools import combinations, count, islice, pairwise
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
 import typer
 
-from doe.discrepancy import Discovery, Emulator, Measured, Settings, Verdict, analyse, drive, fit_emulator
-from doe.discrepancy.fitting.model_fit import Fitted
-from doe.discrepancy.verdict.next_experiment import TIMES
+from doe.discrepancy import Point, SearchSpace, Verdict
+from experiments.cases import Resources, open_workers
+from experiments.cases.store.outcome_table import OutcomeTable
+from experiments.discover.engine_simulator import EngineSimulator
+from experiments.discover.mechanism_files import library_for
+from experiments.discover.search import Search
 from experiments.evidence.record_page import markdown_table
-from experiments.evidence.trials.baselines.emulated_world import (
-    REPLICATES,
-    emulated_heaps,
-    fresh_runs,
-    redrawn_bank,
-    true_world,
-)
-from experiments.evidence.trials.baselines.method_tables import paired
-from experiments.evidence.trials.baselines.protocol import Problem
+from experiments.evidence.trials.analyses import analysis_name, run_together
+from experiments.evidence.trials.declaration import Declaration, read_declaration
+from experiments.evidence.trials.findings import EVERYTHING, read_findings
+from experiments.evidence.trials.generate_trials import STUDY, generators_study
+from experiments.evidence.trials.run_trials import run_trials
+from experiments.evidence.trials.trial_heaps import cases_of, write_heaps
+from experiments.evidence.trials.trials_folder import Folder, noted_run
+from experiments.evidence.trials.truth import Kind, Label, Sealed
+from experiments.evidence.trials.truths import Plan
+from experiments.studyfile import load_study
 
-TABLE = Path(__file__).with_name("record") / "ties.csv"
-BANKS = 4
 HIDDEN, SIZES = ("contact_adhesion", "liquid_bridges", "rolling_torque"), (0.1, 0.5)
 """Effects that tie with one another, and coded sizes at which they do."""
+REPLICATES = 10
+"""Heaps a condition, before more are proposed."""
+MORE = "-more"
+"""End of the name of a twin that has all its heaps."""
 OUTCOMES = ("the truth", "a tie", "unknown", "nothing", "a wrong name")
-"""Answers after the repetition, the best first."""
-SEARCH, RANDOM, EVERY = "the search", "random", "every condition"
-CHOICES = (SEARCH, "2604.01231", RANDOM)
-Searched = tuple[Problem, Discovery]
+"""Answers, the best first."""
 FORECASTS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.01)
 
 
-@cache
-def bank_of(number: int) -> Emulator:
-    """Fit a bank of the world."""
-    return fit_emulator(redrawn_bank(*true_world(), number))
+def twin(number: int, space: SearchSpace) -> Label:
+    """Draw the truth of a twin."""
+    rng, hidden = np.random.default_rng([number, 6]), HIDDEN[number % len(HIDDEN)]
+    theta = tuple(rng.uniform(space.lower, space.upper).tolist())
+    size, seed = space.natural_size(hidden, rng.uniform(*SIZES)), int(rng.integers(2**31))
+    return Label(f"twin-{number:03d}", Kind.SINGLE, theta, ((hidden, size),), (), seed, "")
 
 
-def heaps_of(number: int) -> tuple[Measured, str, float]:
-    """Draw all heaps that anyone may measure of a twin; return its effect, too."""
-    truth, settings = true_world()
-    space, rng = truth.emulator.space, np.random.default_rng([number, 4])
-    theta, hidden = rng.uniform(space.lower, space.upper).tolist(), HIDDEN[number % len(HIDDEN)]
-    size = space.natural_size(hidden, rng.uniform(*SIZES))
-    most = (1 + TIMES[-1] * len(space.conditions)) * REPLICATES
-    return emulated_heaps(truth, theta, {hidden: size}, most, number, settings.systematic), hidden, size
+def proposal(folder: Folder, trial: str) -> dict[str, Any] | None:
+    """Return the next experiment that the search of a twin proposes, if it ended in a tie."""
+    path = folder.discovery(analysis_name(trial, EVERYTHING))
+    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    return found["next_experiment"] if found.get("verdict") == Verdict.TIE else None
 
 
-def searched(heaps: Measured, number: int, rules: Settings, repeated: str = "", more: int = 0) -> Searched:
-    """Search the first heaps of every condition, and more of one, or as many more of all together."""
-    share = math.ceil(more / len(heaps.conditions)) * (repeated == EVERY)
-    counts = {name: REPLICATES + (more if name == repeated else share) for name in heaps.conditions}
-    values = {name: rows[: counts[name]] for name, rows in heaps.values.items()}  # noqa: PD011
-    seen = replace(heaps, values=values, reasons={})
-    problem = Problem(str(number), bank_of(number % BANKS), seen, rules, number)
-    return problem, drive(analyse(seen, problem.emulator, rules, number), fresh_runs)
+def outcome(found: Mapping[str, Any], hidden: str) -> str:
+    """Classify a finding."""
+    if found["verdict"] == Verdict.NAMED:
+        return "the truth" if found["named"] == hidden else "a wrong name"
+    return {"tie": "a tie", "unknown": "unknown", "none": "nothing"}.get(found["verdict"], found["verdict"])
 
 
-def contrast(models: Sequence[Fitted], condition: str) -> float:
-    """Compute the criterion of arXiv:2604.01231 for a condition.
+def answered(
+    folder: Folder, what: str, waves: Mapping[str, tuple[Label, list[Point]]], bank: Path, device: str | None
+) -> None:
+    """Make the heaps of some trials, and search them in step."""
+    study = generators_study(read_declaration(folder.declared).scale)
+    table = OutcomeTable(folder.hidden / "outcomes.sqlite")
+    with (
+        open_workers(Resources(device)) as workers,
+        EngineSimulator(study, library_for(study), table, workers) as engine,
+        noted_run(folder, f"heaps, {what}", device, table),
+    ):
+        made = run_together([points for _, points in waves.values()], engine)
+        for (trial, (label, points)), outcomes in zip(waves.items(), made, strict=True):
+            write_heaps(folder.measured(trial), label, points, outcomes, engine.observables)
+    run_trials(folder, [Sealed(trial, what, (), "") for trial in waves], (EVERYTHING,), bank, device)
 
-    It is the mean over pairs of plausible models of the largest squared difference of their predictions, at
-    their fits. Where its authors have one observable, there are several here, in deviations of one run.
-    """
-    sd = np.sqrt(np.diag(models[0].model.run_covariance(models[0].x, condition)))
-    means = [one.model.predict(one.x[None], condition)[0] / sd for one in models]
-    return float(np.mean([np.max((one - other) ** 2) for one, other in combinations(means, 2)]))
 
-
-def outcome(found: Discovery, hidden: str) -> str:
-    """Classify an answer."""
-    if found.verdict is Verdict.NAMED:
-        return "the truth" if found.named == (hidden,) else "a wrong name"
-    return {Verdict.TIE: "a tie", Verdict.UNKNOWN: "unknown"}.get(found.verdict, "nothing")
-
-
-def ties(start: int, rules: Settings) -> Iterator[dict[str, object]]:
-    """Yield ties from a twin on: the choices of a condition, and the answer after each is repeated."""
-    for number in count(start):
-        heaps, hidden, size = heaps_of(number)
-        problem, found = searched(heaps, number, rules)
-        step = found.next_experiment
-        if found.verdict is not Verdict.TIE or step is None:
-            continue
-        models = [problem.fitted((name,)) for name in found.named]
-        proposed = step.conditions[0] if len(step.conditions) == 1 else EVERY
-        heaps_more = step.replicates * len(step.conditions)
-        drawn = str(np.random.default_rng([number, 5]).choice(heaps.conditions))
-        farthest = max(heaps.conditions, key=lambda name: contrast(models, name))
-        again = {c: searched(heaps, number, rules, c, heaps_more)[1] for c in (*heaps.conditions, EVERY)}
-        row = {"twin": number, "hidden": hidden, "size": f"{size:.4g}", "tied": " ".join(found.named)}
-        row |= {"heaps": heaps_more, "chance": f"{step.chance:.3f}"}
-        row |= dict(zip(CHOICES, (proposed, farthest, drawn), strict=True))
-        yield row | {name: outcome(one, hidden) for name, one in again.items()}
+def answers(folder: Folder, labels: Sequence[Label]) -> pd.DataFrame:
+    """Tabulate the twins: what is hidden, the first answer, what is proposed, and the answer after it."""
+    found = read_findings([folder.findings]).set_index("trial")
+    rows = []
+    for label in labels:
+        (hidden, size), first = label.sizes[0], found.loc[label.trial]
+        row: dict[str, Any] = {"twin": label.trial, "hidden": hidden, "size": size}
+        row["first"] = outcome(first, hidden)
+        row |= {"named": first["named"], "fresh runs": first["fresh_cases"], "chance": np.nan}
+        if step := proposal(folder, label.trial):
+            last = found.loc[label.trial + MORE]
+            row |= {"condition": " ".join(step["conditions"]), "chance": step["chance"]}
+            row |= {"heaps": step["replicates"] * len(step["conditions"])}
+            row |= {"after": outcome(last, hidden), "named after": last["named"]}
+        rows.append(row)
+    return pd.DataFrame(rows)
 
 
 def compared(table: pd.DataFrame) -> pd.DataFrame:
-    """Compare the choices: the share of ties that each settles, and McNemar's test against the search."""
-    after = table.loc[:, RANDOM:].iloc[:, 1:]
-    ends = {one: pd.Series([row[row[one]] for _, row in table.iterrows()]) for one in CHOICES}
-    ends["best in hindsight"] = after.map(OUTCOMES.index).min(axis=1).map(OUTCOMES.__getitem__)
-    ends |= {f"always {name}": after[name] for name in after}
-    own, rows = ends[SEARCH] == OUTCOMES[0], []
-    for name, end in ends.items():
-        right = end == OUTCOMES[0]
-        gap = 100.0 * (own.astype(float) - right)
-        share = f"{100 * right.mean():.0f} ({100 * right.sem():.1f})"
-        rows.append({"condition": name, "the truth alone, % (se)": share})
-        rows[-1] |= {one: str((end == one).sum()) for one in OUTCOMES[1:]}
-        rows[-1]["the search more, % (se)"] = f"{gap.mean():+.0f} ({gap.sem():.1f})"
-        rows[-1]["only the search : only it"] = str(paired(own, right))
+    """Compare the answers after the proposed heaps with the stated chance, by effect and by that chance."""
+    ties = table[table["chance"].notna()]
+    parts = {"all": ties, **{name: ties[ties["hidden"] == name] for name in HIDDEN}}
     for low, high in pairwise(FORECASTS):
-        among = (table["chance"] >= low) & (table["chance"] < high)
-        each, mean = own[among], 100 * table["chance"][among].mean()
-        share = f"{100 * each.mean():.0f} ({100 * each.sem():.1f})"
-        words = f"forecast from {100 * low:.0f} % on, {mean:.0f} on average: {len(each)}"
-        rows += [{"condition": words, "the truth alone, % (se)": share}] if len(each) else []
-    return pd.DataFrame(rows).fillna("")
+        words = f"stated {100 * low:.0f} % or more"
+        parts[words] = ties[(ties["chance"] >= low) & (ties["chance"] < high)]
+    rows = []
+    for words, part in parts.items():
+        if part.empty:
+            continue
+        right = 100.0 * (part["after"] == OUTCOMES[0])
+        tied = [hidden in named.split() for hidden, named in zip(part["hidden"], part["named"], strict=True)]
+        row = {"ties": words, "number": len(part), "truth in the tie": sum(tied)}
+        row |= {"heaps, mean": round(part["heaps"].mean()), "stated, %": round(100 * part["chance"].mean())}
+        row["the truth alone, % (se)"] = f"{right.mean():.0f} ({right.sem():.1f})"
+        rows.append(row | {one: int((part["after"] == one).sum()) for one in OUTCOMES[1:]})
+    return pd.DataFrame(rows)
 
 
 def main(
-    number: Annotated[int, typer.Option("--count", help="Ties.", min=1)] = 100,
-    table: Annotated[Path, typer.Option(help="Table of the record; it may be begun.")] = TABLE,
-    runs: Annotated[int, typer.Option("--fresh-runs", help="Multiple of the study's fresh runs.", min=1)] = 1,
+    root: Annotated[Path, typer.Argument(help="Folder of the twins; it may be begun.")],
+    bank: Annotated[Path, typer.Option(help="Bank of the trial study at that scale.")],
+    number: Annotated[int, typer.Option("--count", help="Twins.", min=1)] = 48,
+    scale: Annotated[str, typer.Option(help="Scale of the trial study.")] = "small",
+    device: Annotated[str | None, typer.Option(help="cpu, or cuda.")] = None,
 ) -> None:
-    """Draw ties, settle them, and print what each choice of a condition gives."""
-    rows = pd.read_csv(table).to_dict("records") if table.is_file() else []
-    start, rules = int(rows[-1]["twin"]) + 1 if rows else 0, true_world()[1]
-    points = runs * rules.refinement_points
-    rules = replace(rules, refinement_points=points, finish_points=2 * points * (runs > 1))
-    for row in islice(ties(start, rules), number - len(rows)):
-        rows.append({str(name): value for name, value in row.items()})
-        pd.DataFrame(rows).to_csv(table, index=False, lineterminator="\n")
-    print(markdown_table(compared(pd.read_csv(table))))
+    """Search twins, make the heaps that are proposed, search again, and print how the ties ended."""
+    folder, search = Folder(root), Search.of(load_study(STUDY, scale))
+    today, plan = time.strftime("%Y-%m-%d"), Plan(replicates=REPLICATES)
+    Declaration(search.study.name, scale, today, plan, search.settings, (), ()).write(folder.declared)
+    labels = [twin(one, search.space) for one in range(number)]
+    first = {label.trial: (label, cases_of(label, search.space.conditions, REPLICATES)) for label in labels}
+    answered(folder, "first", first, bank, device)
+    more = {}
+    for trial, (label, points) in first.items():
+        if step := proposal(folder, trial):
+            others = cases_of(replace(label, seed=label.seed + 1), step["conditions"], step["replicates"])
+            more[trial + MORE] = label, [*points, *others]
+    answered(folder, "more", more, bank, device)
+    table = answers(folder, labels)
+    table.to_csv(folder.root / "ties.csv", index=False, lineterminator="\n", float_format="%.4g")
+    print(markdown_table(pd.crosstab(table["hidden"], table["first"]).reset_index()))
+    print(markdown_table(compared(table)))
 
 
 if __name__ == "__main__":
