@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, Hopper, Interaction, Material
+from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, Hopper, Interaction
 from experiments.evidence.verification.check import Curve, Plot, Result, Row, absolute_row, detection_row
+from experiments.evidence.verification.problems.janssen import GLASS
 from experiments.evidence.verification.problems.setups import GRAVITY, STEEL
 from experiments.evidence.verification.problems.stored import finished_cases
 
@@ -19,9 +20,6 @@ LEAST_CONSTANT, LARGEST_CONSTANT = 0.55, 0.65
 
 DIAMETER = 3e-3
 """Mean of the spheres [m]."""
-
-GLASS = Material(density=2500.0, shear_modulus=1e6, poisson_ratio=0.25)
-"""Spheres as heavy as glass, but so soft that a second takes 18,000 steps."""
 
 OUTLETS = (6, 7, 8, 9, 10)
 """Diameters of the outlet, in sphere diameters."""

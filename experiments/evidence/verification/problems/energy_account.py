@@ -43,7 +43,6 @@ class Moment:
     """Tangential displacement [m] before it was turned into the contact's plane, after, at the end of the
     step, and the part of it that slid away, shape (n, 3)."""
     spring: np.ndarray
-    normal_spring: np.ndarray
     normal_damping: np.ndarray
     tangential_damping: np.ndarray
     """Forces on the first grain [N], shape (n, 3)."""
@@ -146,7 +145,6 @@ class EnergyAccount:
             displacement,
             advanced - displacement,
             pull,
-            normal * spring[:, None],
             normal * damping[:, None],
             drag,
             forces,

@@ -1,7 +1,7 @@
 """Spheres in a tube that is drawn slowly upwards: what floor and wall carry, against Janssen."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -19,7 +19,7 @@ from experiments.evidence.verification.check import (
     detection_row,
     relative_row,
 )
-from experiments.evidence.verification.problems.setups import GRAVITY, STEEL, bodies, contact
+from experiments.evidence.verification.problems.setups import GRAVITY, STEEL, bodies, contact, downhill, world
 
 GLASS = Material(density=2500.0, shear_modulus=1e6, poisson_ratio=0.25)
 """Material as heavy as glass, so soft that a second takes 17,000 steps; overlaps stay below a hundredth."""
@@ -132,19 +132,13 @@ def column(ratio: float, seed: int) -> WorldSetup:
         velocities=rng.normal(size=places.shape) * 0.2,
         sizes=rng.uniform(0.9, 1.1, len(places)),
     )
-    top = float(places[:, 2].max()) + diameter
-    return WorldSetup(
-        grains=grains,
-        shapes=(SPHERE,),
-        contacts=(contact(GLASS, GLASS, 0.5, FRICTION), contact(GLASS, STEEL, 0.5, WALL_FRICTION)),
-        # The tube begins below the floor, so that it has no lower rim while it is drawn.
-        walls=((Plane(), 1), (Cylinder((0.0, 0.0, -diameter), diameter / 2.0, top + diameter), 1)),
-        time_step=0.25 * rayleigh_time(0.9 * radius, GLASS),
-        skin=0.5 * radius,
-        speed_limit=20.0,
-        domain=((-diameter, -diameter, -diameter), (diameter, diameter, top)),
-        gravity=(0.0, 0.0, -GRAVITY),
-    )
+    top, step = float(places[:, 2].max()) + diameter, 0.25 * rayleigh_time(0.9 * radius, GLASS)
+    # The tube begins below the floor, so that it has no lower rim while it is drawn.
+    walls = Plane(), Cylinder((0.0, 0.0, -diameter), diameter / 2.0, top + diameter)
+    spheres, wall = contact(GLASS, GLASS, 0.5, FRICTION), contact(GLASS, STEEL, 0.5, WALL_FRICTION)
+    made = world(grains, SPHERE, spheres, step, walls=walls, gravity=downhill(0.0))
+    domain = (-diameter, -diameter, -diameter), (diameter, diameter, top)
+    return replace(made, contacts=(spheres, wall), domain=domain)
 
 
 def _lattice(radius: float, count: int) -> np.ndarray:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem_warp import EDEM, PRESETS, ClumpShape, ContactLaws, Interaction, Material
-from dem_warp.model import ContactCoefficients
+from dem_warp.model import ContactCoefficients, Grains
 from dem_warp.solver import CHUNK, Solver
 from experiments.evidence.verification.check import Result, Row, detection_row
 from experiments.evidence.verification.problems.contact_dumps import run_path
@@ -68,32 +68,23 @@ fix i{number} all insert/pack seed 32452843 distributiontemplate kinds maxattemp
     all_in no region r{number} particles_in_region 1"""
 
 
-@dataclass(frozen=True, eq=False)
-class Meeting:
-    """Clumps before they meet: arrays of (grains, 3), orientations (grains, 4) as x y z w."""
-
-    positions: np.ndarray
-    orientations: np.ndarray
-    velocities: np.ndarray
-    spins: np.ndarray
-
-    @classmethod
-    def drawn(cls, seed: int = 5) -> Meeting:
-        """Draw pairs that fly at each other along y."""
-        rng, count = np.random.default_rng(seed), 2 * PAIRS
-        side = np.tile([-1.0, 1.0], PAIRS)
-        along = APART * (np.repeat(np.arange(PAIRS), 2) - 0.5 * (PAIRS - 1))
-        off = rng.uniform(-5e-4, 5e-4, (count, 2))
-        positions = np.column_stack([along + off[:, 0], 4e-3 * side, off[:, 1]])
-        speeds = rng.uniform((-0.1, 0.1, -0.1), (0.1, 0.3, 0.1), (count, 3))
-        turns = Rotation.random(count, random_state=seed).as_quat()
-        velocities = speeds * np.column_stack([np.ones(count), -side, np.ones(count)])
-        return cls(positions, turns, velocities, rng.uniform(-40.0, 40.0, (count, 3)))
+def meeting_clumps(seed: int = 5) -> Grains:
+    """Draw pairs of clumps that fly at each other along y."""
+    rng, count = np.random.default_rng(seed), 2 * PAIRS
+    side = np.tile([-1.0, 1.0], PAIRS)
+    along = APART * (np.repeat(np.arange(PAIRS), 2) - 0.5 * (PAIRS - 1))
+    off = rng.uniform(-5e-4, 5e-4, (count, 2))
+    places = np.column_stack([along + off[:, 0], 4e-3 * side, off[:, 1]])
+    speeds = rng.uniform((-0.1, 0.1, -0.1), (0.1, 0.3, 0.1), (count, 3))
+    turns = Rotation.random(count, random_state=seed).as_quat()
+    speeds *= np.column_stack([np.ones(count), -side, np.ones(count)])
+    spins = rng.uniform(-40.0, 40.0, (count, 3))
+    return bodies(places, GRAIN.density, velocities=speeds, spins=spins, orientations=turns)
 
 
 def liggghts_clumps(device: str) -> Result:
     """Compare pairs without friction, with some and with much."""
-    shape, meeting = read_clump(CLUMP).shape, Meeting.drawn()
+    shape, meeting = read_clump(CLUMP).shape, meeting_clumps()
     rows: list[Row] = []
     for friction in FRICTIONS:
         case = f"friction {friction:g}"
@@ -108,7 +99,7 @@ def liggghts_clumps(device: str) -> Result:
     return Result("Clumps in LIGGGHTS", TEXT, tuple(rows))
 
 
-def _differences(meeting: Meeting, ours: Motion, theirs: Motion) -> dict[str, float]:
+def _differences(meeting: Grains, ours: Motion, theirs: Motion) -> dict[str, float]:
     """Largest differences of velocities and of spins over their largest changes."""
     changes = {}
     for what, own, other, start in zip(
@@ -127,24 +118,16 @@ def _contact(friction: float, shape: ClumpShape, laws: ContactLaws) -> Contact:
     return Contact(GRAIN, GRAIN, surface, law, radius, mass, laws.normal_damping)
 
 
-def _here(meeting: Meeting, shape: ClumpShape, friction: float, laws: ContactLaws, device: str) -> Motion:
+def _here(meeting: Grains, shape: ClumpShape, friction: float, laws: ContactLaws, device: str) -> Motion:
     """Velocities and spins after the meeting under some laws."""
-    grains = bodies(
-        meeting.positions,
-        GRAIN.density,
-        velocities=meeting.velocities,
-        spins=meeting.spins,
-        orientations=meeting.orientations,
-    )
-    law = _contact(friction, shape, laws).coefficients
-    made = world(grains, shape, law, STEP, extent=0.3)
+    made = world(meeting, shape, _contact(friction, shape, laws).coefficients, STEP, extent=0.3)
     solver = Solver([replace(made, forms=laws.forms)], device, "double")
     solver.advance(CHUNKS)
     end = solver.poses(0)
     return np.array(end["velocities"]), np.array(end["spins"])
 
 
-def _in_liggghts(meeting: Meeting, shape: ClumpShape, contact: Contact, folder: Path) -> Motion:
+def _in_liggghts(meeting: Grains, shape: ClumpShape, contact: Contact, folder: Path) -> Motion:
     """Velocities and spins after the meeting in LIGGGHTS, whose clumps have those of their spheres."""
     count, steps = shape.sphere_count, CHUNKS * CHUNK
     half, terms = APART * (0.5 * PAIRS + 1.0), values(LIGGGHTS.contact_terms(contact))
@@ -178,7 +161,7 @@ def _centres(places: np.ndarray, shape: ClumpShape) -> np.ndarray:
     return np.array(centres)
 
 
-def _grains(meeting: Meeting) -> list[str]:
+def _grains(meeting: Grains) -> list[str]:
     """Commands that put the grains in."""
     blocks = np.stack([meeting.positions - WITHIN, meeting.positions + WITHIN], axis=-1).reshape(-1, 6)
     turns = np.roll(meeting.orientations, 1, axis=1)  # w x y z
