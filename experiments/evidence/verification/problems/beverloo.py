@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -83,35 +82,30 @@ def hopper_case(outlet: float, friction: float, seed: int, half_angle: float = 9
     return Case(hopper, grains, surfaces, surfaces, seed=seed)
 
 
-@dataclass(frozen=True)
-class Flow:
-    """Steady flow out of one hopper."""
-
-    outlet: float
-    """Opening, in sphere diameters."""
-    rate: float
-    """Mass over bulk density, root of gravity and diameter of the spheres to the power of 2.5."""
-
-    @classmethod
-    def of(cls, outlet: float, result: CaseResult) -> "Flow":
-        """Flow of a case that has a rate."""
-        seen = result.observables
-        bulk_density = GLASS.density * seen["solid_fraction"]
-        return cls(outlet, seen["flow_rate"] / (bulk_density * np.sqrt(GRAVITY) * DIAMETER**EXPONENT))
+def scaled_rate(result: CaseResult) -> float:
+    """Return the rate over bulk density, root of gravity and diameter of the spheres to the power of 2.5."""
+    seen = result.observables
+    bulk_density = GLASS.density * seen["solid_fraction"]
+    return float(seen["flow_rate"] / (bulk_density * np.sqrt(GRAVITY) * DIAMETER**EXPONENT))
 
 
-def exponent(flows: Sequence[Flow], k: float) -> float:
+Flows = Sequence[tuple[float, float]]
+"""Outlets in sphere diameters, each with a scaled rate."""
+
+
+def exponent(flows: Flows, k: float) -> float:
     """Power of the outlet less `k` sphere diameters that the rates follow, by least squares."""
-    openings = np.log([flow.outlet - k for flow in flows])
-    return float(np.polyfit(openings, np.log([flow.rate for flow in flows]), 1)[0])
+    outlets, rates = np.array(flows).T
+    return float(np.polyfit(np.log(outlets - k), np.log(rates), 1)[0])
 
 
-def rate_constant(flows: Sequence[Flow], k: float) -> float:
+def rate_constant(flows: Flows, k: float) -> float:
     """Beverloo's C, geometric mean over the outlets."""
-    return float(np.exp(np.mean([np.log(flow.rate / (flow.outlet - k) ** EXPONENT) for flow in flows])))
+    outlets, rates = np.array(flows).T
+    return float(np.exp(np.log(rates / (outlets - k) ** EXPONENT).mean()))
 
 
-def _rows(flows: Mapping[float, Sequence[Flow]]) -> list[Row]:
+def _rows(flows: Mapping[float, Flows]) -> list[Row]:
     law = "Beverloo et al. (1961)"
     middle = 0.5 * (LEAST_CONSTANT + LARGEST_CONSTANT)
     realistic, *_ = FRICTIONS
@@ -132,13 +126,13 @@ def _rows(flows: Mapping[float, Sequence[Flow]]) -> list[Row]:
     return rows
 
 
-def _plot(flows: Mapping[float, Sequence[Flow]]) -> Plot:
+def _plot(flows: Mapping[float, Flows]) -> Plot:
     outlets = np.linspace(OUTLETS[0] - 0.5, OUTLETS[-1] + 0.5, 60)
     curves = []
     for colour, (friction, each) in enumerate(flows.items()):
         constant = rate_constant(each, K)
         law = constant * (outlets - K) ** EXPONENT
-        openings, rates = np.array([(flow.outlet, flow.rate) for flow in each]).T
+        openings, rates = np.array(each).T
         curves += [
             Curve(f"friction {friction:g}", openings, rates, "points", colour),
             Curve(f"{constant:.3f} (D/d - {K:g})^2.5", outlets, law, "line", colour),
@@ -151,10 +145,10 @@ def beverloo(device: str) -> Result:
     seeds = range(1, 1 + SEEDS["cpu" if device == "cpu" else "cuda"])
     settings = [(friction, outlet, seed) for friction in FRICTIONS for outlet in OUTLETS for seed in seeds]
     cases = [hopper_case(outlet, friction, seed) for friction, outlet, seed in settings]
-    flows: dict[float, list[Flow]] = {friction: [] for friction in FRICTIONS}
+    flows: dict[float, list[tuple[float, float]]] = {friction: [] for friction in FRICTIONS}
     for (friction, outlet, _), result in zip(settings, finished_cases(cases, device), strict=True):
         if "flow_rate" in result.observables:
-            flows[friction].append(Flow.of(outlet, result))
+            flows[friction].append((outlet, scaled_rate(result)))
     labels = (PROBLEM, f"all {len(cases)} hoppers", "hoppers without a rate", "none clogs")
     lost = len(cases) - sum(len(each) for each in flows.values())
     rows = (absolute_row(labels, 0.0, lost, 0.0), *_rows(flows))
@@ -167,8 +161,7 @@ def coned(device: str) -> Result:
     friction, name = list(FRICTIONS.items())[-1]
     for angle in angles:
         cases = [hopper_case(CONE_OUTLET, friction, seed, angle) for seed in range(1, 1 + CONE_SEEDS)]
-        flows = [Flow.of(CONE_OUTLET, result) for result in finished_cases(cases, device)]
-        rates.append(float(np.mean([flow.rate for flow in flows])))
+        rates.append(float(np.mean([scaled_rate(result) for result in finished_cases(cases, device)])))
     tangents = np.tan(np.radians(HALF_ANGLES))
     power = float(np.diff(np.log(rates[:2]))[0] / np.diff(np.log(tangents))[0])
     labels = ("Spheres out of a hopper with a cone", name, "power of the tangent", "Rose and Tanaka (1959)")

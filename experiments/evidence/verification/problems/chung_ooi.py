@@ -1,10 +1,7 @@
 """Settings of the eight impact tests of Chung and Ooi.
 
 Y. C. Chung and J. Y. Ooi, Benchmark tests for verifying discrete element modelling codes at particle impact
-level, Granular Matter 13 (2011) 643-656. The paper itself was not at hand: radii, speeds and material
-constants are those that two other codes state for the same tests, Yade (its examples for tests 1 to 4) and
-Kratos Multiphysics (its DEM benchmarks 1 to 8), which agree where both have them. Not had: the constants of
-polyethylene (test 5), nylon (test 6) and copper (test 7), and which two pairs test 8 compares.
+level, Granular Matter 13 (2011) 643-656; where the numbers come from is said in `normal_impact.ELASTIC_TEXT`.
 """
 
 from dem_warp import ContactLaws, Material

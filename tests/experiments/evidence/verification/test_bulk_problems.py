@@ -45,7 +45,7 @@ def test_the_wall_of_a_tube_that_is_drawn_upwards_carries_what_janssen_says():
 
 
 def test_exponent_and_constant_come_back_from_beverloos_law():
-    flows = [beverloo.Flow(outlet, 0.6 * (outlet - 1.4) ** beverloo.EXPONENT) for outlet in (6.0, 8.0, 10.0)]
+    flows = [(outlet, 0.6 * (outlet - 1.4) ** beverloo.EXPONENT) for outlet in (6.0, 8.0, 10.0)]
     assert beverloo.exponent(flows, 1.4) == pytest.approx(beverloo.EXPONENT, rel=1e-9)
     assert beverloo.rate_constant(flows, 1.4) == pytest.approx(0.6, rel=1e-9)
     # A correction that is too large makes small outlets look too good.
