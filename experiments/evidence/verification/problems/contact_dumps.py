@@ -29,6 +29,20 @@ def box_of(setup: PathSetup) -> tuple[float, ...]:
     return (-0.02, 0.02, -0.02, 0.02, -1e-3 if setup.path.has_plate else -0.02, 0.02)
 
 
+def atoms(setup: PathSetup, spin: str) -> str:
+    """Commands that make the spheres; `spin` is the code's own format for that of one."""
+    lines = []
+    for number, (place, radius) in enumerate(zip(setup.positions.tolist(), setup.radii, strict=True), 1):
+        lines += [
+            f"create_atoms 1 single {' '.join(map(repr, place))} units box",
+            f"set atom {number} diameter {2.0 * radius!r} density {setup.grain.density!r}",
+            f"set atom {number} {spin.format(*setup.path.spins[number - 1])}",
+            f"group sphere{number} id {number}",
+            f"velocity sphere{number} set {' '.join(map(str, setup.path.speeds[number - 1]))}",
+        ]
+    return "\n".join([*lines, ""])
+
+
 def run_path(program: str, package: str, text: str, folder: Path, count: int) -> Trajectory:
     """Run an input in a folder and read its states."""
     if (found := shutil.which(program)) is None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dem_warp import PRESETS
 from experiments.evidence.verification.check import Result, Row, relative_row
-from experiments.evidence.verification.problems.contact_dumps import box_of, run_commands, run_path
+from experiments.evidence.verification.problems.contact_dumps import atoms, box_of, run_commands, run_path
 from experiments.evidence.verification.problems.contact_paths import (
     GRAIN,
     PATHS,
@@ -72,23 +72,9 @@ def follow(setup: PathSetup, folder: Path) -> Trajectory:
         text.neighbors(0.0005),
         text.contacts({"* *": words}, setup.time_step),
         f"fix plate all wall/gran granular {words} zplane 0 NULL\n" * setup.path.has_plate,
-        _atoms(setup),
+        atoms(setup, "omega {} {} {}"),
         text.weight((0.0, 0.0, -setup.gravity)),
         "fix motion all nve/sphere\n",
         run_commands(setup, "format line"),
     ]
     return run_path("lmp", "lammps", "".join(parts), folder, len(setup.radii))
-
-
-def _atoms(setup: PathSetup) -> str:
-    lines = []
-    for number, (place, radius) in enumerate(zip(setup.positions.tolist(), setup.radii, strict=True), 1):
-        (vx, vy, vz), (wx, wy, wz) = setup.path.speeds[number - 1], setup.path.spins[number - 1]
-        lines += [
-            f"create_atoms 1 single {' '.join(map(repr, place))}",
-            f"set atom {number} diameter {2.0 * radius!r} density {setup.grain.density!r}",
-            f"set atom {number} omega {wx} {wy} {wz}",
-            f"group sphere{number} id {number}",
-            f"velocity sphere{number} set {vx} {vy} {vz}",
-        ]
-    return "\n".join([*lines, ""])

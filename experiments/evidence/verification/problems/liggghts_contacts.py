@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dem_warp import PRESETS, ContactLaws
 from experiments.evidence.verification.check import Result
-from experiments.evidence.verification.problems.contact_dumps import box_of, run_commands, run_path
+from experiments.evidence.verification.problems.contact_dumps import atoms, box_of, run_commands, run_path
 from experiments.evidence.verification.problems.contact_paths import (
     PathSetup,
     Trajectory,
@@ -52,21 +52,9 @@ def follow(setup: PathSetup, folder: Path) -> Trajectory:
         text.head(("grains", "plate"), box_of(setup), 0.0005, sort="sort 0 0"),
         text.contacts(text.properties(materials, lambda i, j: terms), model, setup.time_step),
         f"fix plate all wall/gran model {model} primitive type 2 zplane 0.0\n" * setup.path.has_plate,
-        _atoms(setup),
+        atoms(setup, "omegax {} omegay {} omegaz {}"),
         text.weight((0.0, 0.0, -setup.gravity)),
         "fix motion all nve/sphere\n",
         run_commands(setup, "format"),
     ]
     return run_path("liggghts", "liggghts", "".join(parts), folder, len(setup.radii))
-
-
-def _atoms(setup: PathSetup) -> str:
-    lines = []
-    for number, (place, radius) in enumerate(zip(setup.positions.tolist(), setup.radii, strict=True), 1):
-        (vx, vy, vz), (wx, wy, wz) = setup.path.speeds[number - 1], setup.path.spins[number - 1]
-        lines += [
-            f"create_atoms 1 single {' '.join(map(repr, place))} units box",
-            f"set atom {number} diameter {2.0 * radius!r} density {setup.grain.density!r} "
-            f"vx {vx} vy {vy} vz {vz} omegax {wx} omegay {wy} omegaz {wz}",
-        ]
-    return "\n".join([*lines, ""])
