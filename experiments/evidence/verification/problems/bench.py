@@ -13,7 +13,7 @@ from experiments.evidence.verification.check import Result, absolute_row, relati
 from experiments.evidence.verification.problems.janssen import GLASS
 from experiments.evidence.verification.problems.setups import GRAVITY, STEEL, WatchedSolver
 
-LABEL, RADIUS, DROPS, SEEDS = "Laws of the bench", 1.5e-3, (0.02, 0.08, 0.32), range(1, 33)
+LABEL, RADIUS, DROPS, SEEDS = "Laws of the bench", 1.5e-3, (0.02, 0.08, 0.32), range(1, 37)
 ROUGH = Interaction(0.3, 0.5, 0.0)
 GRAINS = GrainPopulation(ClumpShape.sphere(RADIUS), GLASS)
 CELL = Shear(0.028, 0.018, STEEL, 1e3, speed=0.04, rest_speed=3e-3)

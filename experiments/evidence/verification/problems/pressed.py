@@ -141,11 +141,11 @@ def _array_rows(device: str) -> list[Row]:
 
 def _packing_row(device: str) -> Row:
     """Row of the modulus of packings, which a free lid presses first without friction, and then with it."""
-    rng, pitch, worlds, smooth = np.random.default_rng(1), 3.4e-3, range(PACKINGS), contact(GLASS, GLASS, 0.1)
+    rng, pitch, worlds, smooth = np.random.default_rng(1), 3.4e-3, range(PACKINGS), contact(GLASS, GLASS, 0.5)
     places = pitch * (np.indices((7, 7, 10)).reshape(3, -1).T - [3.0, 3.0, -0.5])
-    packings = [(rng.normal(places, 1e-4), rng.uniform(0.9, 1.1, 490), 10 * pitch) for _ in worlds]
+    packings = [(rng.normal(places, 2e-5), rng.uniform(0.9, 1.1, 490), 10 * pitch) for _ in worlds]
     for friction, stresses, chunks in ((0.0, STRESSES[:1], 180), (FRICTION, STRESSES, 24)):
-        laws = contact(GLASS, GLASS, 0.1, friction), smooth
+        laws = contact(GLASS, GLASS, 0.5, friction), smooth
         more: Any = {"contacts": laws, "free_wall": 1, "period": 7 * pitch, "air_drag": 100.0}
         setups = [_plated(bodies(each, GLASS.density, sizes=s), top, **more) for each, s, top in packings]
         solver, heights = Solver(setups, device, "double"), []
