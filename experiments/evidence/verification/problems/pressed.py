@@ -52,9 +52,6 @@ SLENDERNESS, FRICTION, WALL_FRICTION = (0.5, 1.0, 2.0), 0.5, 0.3
 DIE = Compression(20 * RADIUS, 0.01, STEEL, 1e4, speed=0.01)
 LONELY = replace(DIE, diameter=8 * RADIUS, fill_depth=2 * RADIUS, stress=100.0, speed=1e-4, grain_count=1)
 
-PACKINGS, STRESSES = 24, np.geomspace(25.0, 250.0, 7)
-"""Packings, and their stresses: 1e-5 to 1e-4 of the modulus of the spheres [Pa]."""
-
 SETTLING, SPEED, STROKE = 0.12, 0.02, 5e-4
 """Time in which grains come to rest [s], then speed [m/s] and path [m] of the piston down, and up again."""
 
@@ -141,10 +138,11 @@ def _array_rows(device: str) -> list[Row]:
 
 def _packing_row(device: str) -> Row:
     """Row of the modulus of packings, which a free lid presses first without friction, and then with it."""
-    rng, pitch, worlds, smooth = np.random.default_rng(1), 3.4e-3, range(PACKINGS), contact(GLASS, GLASS, 0.5)
+    rng, pitch, worlds, smooth = np.random.default_rng(1), 3.4e-3, range(24), contact(GLASS, GLASS, 0.5)
+    pressures = np.geomspace(25.0, 250.0, 7)
     places = pitch * (np.indices((7, 7, 10)).reshape(3, -1).T - [3.0, 3.0, -0.5])
     packings = [(rng.normal(places, 2e-5), rng.uniform(0.9, 1.1, 490), 10 * pitch) for _ in worlds]
-    for friction, stresses, chunks in ((0.0, STRESSES[:1], 180), (FRICTION, STRESSES, 24)):
+    for friction, stresses, chunks in ((0.0, pressures[:1], 180), (FRICTION, pressures, 24)):
         laws = contact(GLASS, GLASS, 0.5, friction), smooth
         more: Any = {"contacts": laws, "free_wall": 1, "period": 7 * pitch, "air_drag": 100.0}
         setups = [_plated(bodies(each, GLASS.density, sizes=s), top, **more) for each, s, top in packings]
@@ -157,8 +155,9 @@ def _packing_row(device: str) -> Row:
         ends = zip(solver.view(worlds), packings, heights[-1], strict=True)
         packings = [(view.positions, sizes, top) for view, (_, sizes, _), top in ends]
     low, high = np.array(heights[::2]), np.array(heights[1::2])
-    powers = np.polyfit(np.log(STRESSES), np.log(STRESSES[:, None] * low / (high - low)), 1)[0]
-    case, quantity = f"{PACKINGS} packings", f"power of the modulus in the stress, +- {sem(powers):.4f}"
+    powers = np.polyfit(np.log(pressures), np.log(pressures[:, None] * low / (high - low)), 1)[0]
+    case = f"{len(worlds)} packings, stresses of 1e-5 to 1e-4 of the balls' modulus"
+    quantity = f"power of the modulus in the stress, +- {sem(powers):.4f}"
     return absolute_row((PROBLEM, case, quantity, "Hertz and Digby"), 1 / 3, powers.mean(), 0.03)
 
 
