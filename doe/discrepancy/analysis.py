@@ -41,7 +41,7 @@ from doe.discrepancy.verdict.conclusion import (
     withdrawn,
 )
 from doe.discrepancy.verdict.discovery import Confounding, Discovery, Effort, Gap, Verdict
-from doe.discrepancy.verdict.next_experiment import NextExperiment, Rival, propose
+from doe.discrepancy.verdict.next_experiment import NextExperiment, Rival, propose, propose_without
 from doe.numerics.one_thread import in_one_thread, steps_in_one_thread
 
 Analysis = Generator[list[Point], Outcomes, Discovery]
@@ -324,7 +324,8 @@ class _Parts:
     ) -> NextExperiment | None:
         """Propose an experiment for the two best explanations, or for the best one and the base.
 
-        In a tie it is for all of the tie. Two rejected models are not worth a measurement.
+        In a tie it is for all of the tie; where repeated tests are not expected to settle it, without one of
+        them. Two rejected models are not worth a measurement.
         """
         if conclusion.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
             return None
@@ -343,7 +344,11 @@ class _Parts:
             whole, limit = self.whole(base.fitted), needed(math.inf, margin)
             rivals = [Rival(whole, base.fitted.score - best.score, limit, parting(whole, best.whole))]
         most = max(int(np.max(block.replicates)) for block in self.evidence.training)
-        return propose(best.whole, rivals, most, self.settings.power)
+        again = propose(best.whole, rivals, most, self.settings.power)
+        if again.settles or conclusion.verdict is not Verdict.TIE:
+            return again
+        without = propose_without(base.fitted, [one.whole for one in ordered], most, self.settings)
+        return without if without and without.settles else again
 
 
 def _empty(

@@ -74,6 +74,8 @@ class MechanismFile(Section):
     """Source of law and range."""
     confirm: str
     """The further experiment that would show it."""
+    removal: str = ""
+    """Instruction that takes it away for a test. Default: there is none."""
     directed: bool = False
     """It has a direction: the test has it along x, a laboratory anywhere."""
     saturation: float | None = Field(default=None, gt=0.0)
@@ -149,7 +151,7 @@ def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float])
         return None
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
     kept = {"title", "sentence", "kind", "parameters", "unit", "source", "confirm", "directed", "saturation"}
-    shared = file.model_dump(include=kept)
+    shared = file.model_dump(include=kept | {"removal"})
     return MechanismFactor(name, null, maximum, **shared, companions=companions)
 
 

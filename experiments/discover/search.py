@@ -78,7 +78,7 @@ class Search:
             tuple(condition.name for condition in conditions),
             tuple(condition.held_out for condition in conditions),
             tuple(
-                MechanismRange(one.name, one.null, one.maximum, one.directed, one.saturation)
+                MechanismRange(one.name, one.null, one.maximum, one.directed, one.saturation, one.removal)
                 for one in self.library
             ),
             odd_observables(self.study),
@@ -145,10 +145,11 @@ class Search:
 
 
 def _up_to_date(bank: Bank, space: SearchSpace) -> Bank:
-    """Return a bank with what older ones do not say: what a mirror turns over, and what saturates."""
+    """Return a bank with what older ones do not say, as what a mirror turns over, and what saturates."""
     bank = bank.saturating({one.name: one.saturation for one in space.mechanisms})
-    directed = {one.name for one in space.mechanisms if one.directed}
-    mechanisms = tuple(replace(one, directed=one.name in directed) for one in bank.space.mechanisms)
+    known = {one.name: (one.directed, one.removal) for one in space.mechanisms}
+    own = [(one, *known.get(one.name, (False, ""))) for one in bank.space.mechanisms]
+    mechanisms = tuple(replace(one, directed=directed, removal=removal) for one, directed, removal in own)
     odd = tuple(name for name in space.odd if name in bank.observables)
     return replace(bank, space=replace(bank.space, mechanisms=mechanisms, odd=odd))
 

@@ -65,6 +65,7 @@ def made_terms(study: Study) -> Terms:
             unit=unit,
             sentence=f"What {title} does to a heap, in plain words.",
             confirm=f"Measure {title} by itself.",
+            removal=f"Take {title} away.",
             null=0.0,
             maximum=maximum,
             parameters=("scene.lifted-cylinder.lift_speed",),

@@ -35,6 +35,8 @@ class MechanismRange:
     saturation: float | None = None
     """Distance from the null over which the effect of a step falls to 1/e; None: the same effect everywhere.
     """
+    removal: str = ""
+    """Instruction that takes it away for a test; empty if there is none."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.null) and math.isfinite(self.maximum)) or self.null == self.maximum:

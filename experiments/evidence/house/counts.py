@@ -214,7 +214,7 @@ def counts() -> list[Count]:
     own, statistics, pictures = (imports_between_rooms(name) for name in ("experiments", "doe", "imaging"))
     data = [name for name in tracked() if not name.endswith((".py", ".pyi"))]
     return [
-        Count("experiments without evidence, lines", lines(product), 35_031),
+        Count("experiments without evidence, lines", lines(product), 35_036),
         Count("experiments, folders without evidence", len(rooms), 15),
         Count("experiments, floors", max(heights(own).values()), 10),
         Count("experiments, imports between rooms", len(own), 65),
@@ -227,7 +227,7 @@ def counts() -> list[Count]:
             sum(circles_broken(pairs)[1] for pairs in (statistics, pictures)),
             0,
         ),
-        Count("installed, lines", lines(name for name in installed() if name.endswith(".py")), 68_898),
+        Count("installed, lines", lines(name for name in installed() if name.endswith(".py")), 68_958),
         Count("wheel [MB]", wheel_megabytes(), 1.5),
         Count("tests, lines", lines(python_files("tests/")), 40_200),
         Count("tracked data [MB]", megabytes(data), 16.0),

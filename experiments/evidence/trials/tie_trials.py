@@ -5,15 +5,14 @@
 
 Each twin has one of three hidden effects that look alike. The engine makes its heaps with the time step and
 the camera of the generator; the search has fresh runs. Where it ends in a tie, the heaps that it proposes are
-made with other seeds; one camera reads all heaps again, and they are searched as those of a new trial. What
-has ended is kept in the folder: the same command goes on.
+made with other seeds. One camera reads all heaps again, and they are searched as those of a new trial; those
+without an effect by themselves. What has ended is kept in the folder: the same command goes on.
 """
 
 import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -41,13 +40,10 @@ from experiments.studyfile import load_study
 
 HIDDEN, SIZES = ("contact_adhesion", "liquid_bridges", "rolling_torque"), (0.1, 0.5)
 """Effects that tie with one another, and coded sizes at which they do."""
-REPLICATES = 10
-"""Heaps a condition, before more are proposed."""
-MORE = "-more"
-"""End of the name of a twin that has all its heaps."""
+REPLICATES, MORE = 10, "-more"
+"""Heaps a condition, before more are proposed, and the end of the name of a twin that has these."""
 OUTCOMES = ("the truth", "a tie", "unknown", "nothing", "a wrong name")
 """Answers, the best first."""
-FORECASTS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.01)
 
 
 def twin(number: int, space: SearchSpace) -> Label:
@@ -65,8 +61,18 @@ def proposal(folder: Folder, trial: str) -> dict[str, Any] | None:
     return found["next_experiment"] if found.get("verdict") == Verdict.TIE else None
 
 
-def outcome(found: Mapping[str, Any], hidden: str) -> str:
-    """Classify a finding."""
+def proposed(label: Label, points: list[Point], step: Mapping[str, Any]) -> tuple[Label, list[Point]]:
+    """Return the heaps of the next experiment: with the first ones, or by themselves where an effect goes."""
+    sizes = tuple(pair for pair in label.sizes if pair[0] != step["without"])
+    other = replace(label, seed=label.seed + 1, sizes=sizes)
+    more = cases_of(other, step["conditions"], step["replicates"])
+    return (other, more) if step["without"] else (label, [*points, *more])
+
+
+def outcome(found: Mapping[str, Any], hidden: str, without: str = "") -> str:
+    """Classify a finding, of heaps with all effects or without one of them."""
+    if without:  # nothing is missing then if it was that one
+        return OUTCOMES[0 if (found["verdict"] == Verdict.NONE) == (hidden == without) else -1]
     if found["verdict"] == Verdict.NAMED:
         return "the truth" if found["named"] == hidden else "a wrong name"
     return {"tie": "a tie", "unknown": "unknown", "none": "nothing"}.get(found["verdict"], found["verdict"])
@@ -96,13 +102,12 @@ def answers(folder: Folder, labels: Sequence[Label]) -> pd.DataFrame:
     for label in labels:
         (hidden, size), first = label.sizes[0], found.loc[label.trial]
         row: dict[str, Any] = {"twin": label.trial, "hidden": hidden, "size": size}
-        row["first"] = outcome(first, hidden)
-        row |= {"named": first["named"], "fresh runs": first["fresh_cases"], "chance": np.nan}
+        row |= {"first": outcome(first, hidden), "named": first["named"], "chance": np.nan}
         if step := proposal(folder, label.trial):
             last = found.loc[label.trial + MORE]
             row |= {"condition": " ".join(step["conditions"]), "chance": step["chance"]}
-            row |= {"heaps": step["replicates"] * len(step["conditions"])}
-            row |= {"after": outcome(last, hidden), "named after": last["named"]}
+            row |= {"heaps": step["replicates"] * len(step["conditions"]), "without": step["without"]}
+            row |= {"after": outcome(last, hidden, step["without"]), "named after": last["named"]}
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -111,9 +116,7 @@ def compared(table: pd.DataFrame) -> pd.DataFrame:
     """Compare the answers after the proposed heaps with the stated chance, by effect and by that chance."""
     ties = table[table["chance"].notna()]
     parts = {"all": ties, **{name: ties[ties["hidden"] == name] for name in HIDDEN}}
-    for low, high in pairwise(FORECASTS):
-        words = f"stated {100 * low:.0f} % or more"
-        parts[words] = ties[(ties["chance"] >= low) & (ties["chance"] < high)]
+    parts |= {"stated 80 % or more": ties[ties["chance"] >= 0.8], "stated less": ties[ties["chance"] < 0.8]}
     rows = []
     for words, part in parts.items():
         if part.empty:
@@ -144,8 +147,7 @@ def main(
     more = {}
     for trial, (label, points) in first.items():
         if step := proposal(folder, trial):
-            others = cases_of(replace(label, seed=label.seed + 1), step["conditions"], step["replicates"])
-            more[trial + MORE] = label, [*points, *others]
+            more[trial + MORE] = proposed(label, points, step)
     answered(folder, "more", more, bank, device)
     table = answers(folder, labels)
     table.to_csv(folder.root / "ties.csv", index=False, lineterminator="\n", float_format="%.4g")

@@ -127,6 +127,8 @@ def next_step(found: Discovery, terms: Terms) -> str:
     )
     shared = {"pair": pair, "tests": step.replicates, "setting": _setting(step.conditions)}
     shared |= {"share": percent(min(step.chance, SURE))}
+    if gone := terms.mechanisms.get(step.without):
+        return say("verdict.without", **shared, title=gone.title, removal=gone.removal.rstrip("."))
     if not step.settles:
         return say("verdict.cannot_settle", **shared)
     how = "surer" if found.verdict is Verdict.NAMED else "repeat"

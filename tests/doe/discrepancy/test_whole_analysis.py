@@ -124,6 +124,19 @@ def test_mechanisms_that_act_alike_are_a_tie_with_an_experiment_to_follow() -> N
     assert found.next_experiment.replicates == 8 * int(found.data.replicates.max())
 
 
+def test_a_tie_is_settled_without_a_mechanism_that_can_be_taken_away() -> None:
+    # alpha is the truth: without the twin it is seen as before, and without both nothing is
+    known = _without(TWINS)
+    mechanisms = tuple(replace(one, removal="x" * (one.name == "twin")) for one in known.space.mechanisms)
+    able = replace(known, space=replace(known.space, mechanisms=mechanisms))
+    step = _run(measure({"alpha": 0.4}, 4), able)[0].next_experiment
+    assert step
+    assert (step.without, step.separates, step.settles) == ("twin", ("twin", "alpha"), True)
+    for truth, is_missing in (({"alpha": 0.4}, True), ({}, False)):
+        again = measure(truth, 7, replicates=step.replicates, conditions=step.conditions)
+        assert (_run(again, known)[0].verdict is not Verdict.NONE) is is_missing
+
+
 def test_a_leader_runs_at_last_against_what_might_overtake_it() -> None:
     _, waves = _tied()
     one_model = SETTINGS.finish_points * SETTINGS.refinement_repeats * len(CONDITIONS)

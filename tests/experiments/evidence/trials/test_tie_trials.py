@@ -3,7 +3,6 @@
 import csv
 from collections import Counter
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 import pandas as pd
@@ -15,7 +14,7 @@ from experiments.discover.search import Search
 from experiments.evidence.trials import tie_trials
 from experiments.evidence.trials.analyses import keep
 from experiments.evidence.trials.generate_trials import STUDY
-from experiments.evidence.trials.tie_trials import HIDDEN, OUTCOMES, REPLICATES, SIZES, compared, main, twin
+from experiments.evidence.trials.tie_trials import HIDDEN, REPLICATES, SIZES, compared, main, twin
 from experiments.evidence.trials.trials_folder import Folder
 from experiments.evidence.trials.truth import Sealed
 from experiments.studyfile import Study, load_study
@@ -27,10 +26,7 @@ def test_twins_have_each_effect_in_turn_in_its_part_of_the_range() -> None:
     space, labels = SEARCH.space, [twin(number, SEARCH.space) for number in range(30)]
     assert [label.mechanisms for label in labels] == [(name,) for name in HIDDEN] * 10
     for label in labels:
-        assert all(
-            low <= value <= high
-            for low, value, high in zip(space.lower, label.theta, space.upper, strict=True)
-        )
+        assert np.all((space.lower <= np.array(label.theta)) & (label.theta <= np.array(space.upper)))
         assert SIZES[0] <= space.coded_size(*label.sizes[0]) <= SIZES[1]
     assert len({label.seed for label in labels}) == len(labels)
 
@@ -44,9 +40,7 @@ class NoisyEngine:
     def __enter__(self) -> "NoisyEngine":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         pass
 
     def __call__(self, points: list[Point]) -> Outcomes:
@@ -92,25 +86,22 @@ def test_proposed_heaps_join_those_of_their_condition(
     assert not (tmp_path / "data" / "twin-001-more.csv").exists()
 
 
+def test_heaps_without_an_effect_are_searched_by_themselves_and_the_alarm_decides() -> None:
+    label, rough = twin(1, SEARCH.space), {"conditions": ["rough"], "replicates": 3}
+    for without, left in (("liquid_bridges", ()), ("rolling_torque", label.sizes)):
+        other, points = tie_trials.proposed(label, [], {**rough, "without": without})
+        assert [point.sizes for point in points] == [left] * 3 == [other.sizes] * 3
+        ends = [tie_trials.outcome({"verdict": v}, "liquid_bridges", without) for v in ("none", "tie")]
+        assert ends == (["the truth", "a wrong name"] if left == () else ["a wrong name", "the truth"])
+
+
 def test_the_table_counts_the_ties_that_were_settled_by_their_stated_chance() -> None:
-    tie = {
-        "hidden": HIDDEN[0],
-        "named": " ".join(HIDDEN[:2]),
-        "chance": 0.9,
-        "heaps": 80,
-        "after": OUTCOMES[0],
-    }
-    rows = [
-        tie,
-        tie,
-        tie | {"after": "unknown"},
-        tie | {"chance": 0.1, "named": HIDDEN[1], "after": "a wrong name"},
-    ]
+    tie = {"hidden": HIDDEN[0], "named": " ".join(HIDDEN), "chance": 1, "heaps": 8, "after": "the truth"}
+    wrong = tie | {"chance": 0.2, "named": HIDDEN[1], "after": "a wrong name"}
+    rows = [tie, tie, tie | {"after": "unknown"}, wrong]
     found = compared(pd.DataFrame([*rows, tie | {"chance": np.nan}])).set_index("ties")
     # a share of 2 of 4 has the standard error sqrt(.5 * .5 / 3), of 2 of 3 sqrt(2 / 9 / 2)
-    assert found["the truth alone, % (se)"].loc[["all", "stated 80 % or more"]].tolist() == [
-        "50 (28.9)",
-        "67 (33.3)",
-    ]
-    assert found.loc["all", ["number", "truth in the tie", "stated, %"]].tolist() == [4, 3, 70]
-    assert found.loc["stated 0 % or more", "a wrong name"] == found.loc["all", "unknown"] == 1
+    right = found["the truth alone, % (se)"].loc[["all", "stated 80 % or more"]]
+    assert right.tolist() == ["50 (28.9)", "67 (33.3)"]
+    assert found.loc["all", ["number", "truth in the tie", "stated, %"]].tolist() == [4, 3, 80]
+    assert found.loc["stated less", "a wrong name"] == found.loc["all", "unknown"] == 1
