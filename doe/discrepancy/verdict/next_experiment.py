@@ -123,7 +123,7 @@ def _without(
 ) -> NextExperiment:
     """Forecast the alarm of measurements without a mechanism, if the least visible other one is right.
 
-    They are calibrated by themselves. The chance is that of Q alone; the alarm asks more of them.
+    They are calibrated by themselves. The chance is that of Q alone; the alarm has further statistics.
     """
     (name,) = one.mechanisms
     measured = [block for block in base.stack.blocks if block.condition in some]
