@@ -10,7 +10,7 @@ from dem_warp.model import WorldSetup
 from dem_warp.parameters import Parameter
 from dem_warp.scenes.phases import UNREST, Phase
 from dem_warp.scenes.poured_controller import PouredController
-from dem_warp.scenes.poured_scene import PouredScene, Rate
+from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Decision, SceneState
 from dem_warp.view import WorldView
@@ -25,8 +25,6 @@ Corner = tuple[float, float, float]
 class FilledScene(PouredScene):
     """A container with a floor at z = 0, filled to a depth by a rain of grains from a height."""
 
-    rate: Rate = "auto"
-    """given: grains rain in at `rain_rate`; auto: as fast as they find places."""
     pour_height: Annotated[float | None, Parameter("m", above=0.0)] = None
     """Height above the floor from which the grains fall. Default: just above the filling."""
 

@@ -30,7 +30,7 @@ POINTS = 200
 SLOW, TOO_FAST = 0.01, 0.3
 """Inertial numbers at the whole depth above which the force depends on the speed, and that are refused."""
 
-WIDE, FINE = 3.0, 5.0
+WIDE, FINE = 5.0, 5.0
 """Least widths of the bin over the tool, and of the tool over a grain, for the force of a wide bed."""
 
 GAP = 0.1
@@ -158,7 +158,9 @@ class Penetration(DrivenScene):
         inertia = self.speed / self.width * size / math.sqrt(GRAVITY * self.depth)
         fast = speed_doubt(self, "tool", inertia, (SLOW, TOO_FAST), "the whole depth")
         narrow = f"the tool is {self.width / size:.1f} grains wide; below {FINE:g} single grains stop it"
-        near = f"the bin is {self.diameter / self.width:.1f} tools wide; below {WIDE:g} its wall adds force"
+        near = (
+            f"the bin is {self.diameter / self.width:.1f} tools wide; below {WIDE:g} a rough wall adds force"
+        )
         left = self.fill_depth - self.depth
         low = f"the tool ends {left / self.width:.1f} of its widths above the base, which adds force below 1"
         found = {

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -14,7 +14,7 @@ from dem_warp.scenes.discharge import DISCHARGE_OBSERVABLES
 from dem_warp.scenes.hopper import Hopper, HopperController
 from dem_warp.scenes.lifted_cylinder import LIFT_OBSERVABLES
 from dem_warp.scenes.plates import Plate, check_glued, check_lip, glued, plate, rim
-from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, Rate
+from dem_warp.scenes.poured_scene import FILL_OBSERVABLES
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Decision, Observable
 from dem_warp.view import WorldView
@@ -52,8 +52,6 @@ class PouredHeap(Hopper):
     """Height of a rim around the plate, which keeps a layer of grains; the heap is what is above it."""
     plate: Plate = "smooth"
     """smooth: a plate of the wall's material; grains: a layer of glued grains, bumps of their size."""
-    rate: Rate = field(default="auto", kw_only=True)
-    """given: grains rain into the funnel at `rain_rate`; auto: as fast as they find places in it."""
 
     name = "poured-heap"
     leaves_a_heap = True

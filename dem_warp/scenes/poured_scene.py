@@ -2,14 +2,14 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.model import GRAVITY, Grains, WorldSetup
-from dem_warp.parameters import LATER, Parameter, check_parameters
+from dem_warp.parameters import Parameter, check_parameters
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 from dem_warp.scenes.scene import Observable
 from dem_warp.scenes.walled_scene import WalledScene, world_of
@@ -19,9 +19,6 @@ FREEBOARD = 1.2
 
 RAIN_FRACTION = 0.1
 """Solid fraction of a rain that finds its own rate: each grain still finds a free place at random."""
-
-Rate = Literal["given", "auto"]
-"""Sources of the rate of a rain."""
 
 FILL_OBSERVABLES = {
     "grain_count": Observable("1", "grains in the container after it was filled and levelled off"),
@@ -36,8 +33,9 @@ FILL_OBSERVABLES = {
 class PouredScene(WalledScene):
     """A container filled by a rain of grains."""
 
-    rain_rate: Annotated[float, Parameter("1/s", above=0.0)] = 3000.0
-    """Grains per second while filling."""
+    rain_rate: Annotated[float | None, Parameter("1/s", above=0.0)] = None
+    """Grains per second while filling. Default: as many as find places in the cross-section, 10 % of
+    the rain's volume at `rain_speed`."""
     rain_speed: Annotated[float, Parameter("m/s", above=0.0)] = 0.5
     """Speed of the raining grains."""
     grain_count: Annotated[int | None, Parameter("1", at_least=1)] = None
@@ -48,9 +46,6 @@ class PouredScene(WalledScene):
     """Time that the grains must stay below `rest_speed` to be at rest."""
     air_drag: Annotated[float, Parameter("1/s", at_least=0.0)] = 0.0
     """Rate at which still air slows a free grain of any size."""
-    rate: Rate = field(default="given", metadata=LATER)
-    """given: grains rain at `rain_rate`; auto: as fast as they find places in the cross-section, 10 % of the
-    rain's volume, at `rain_speed`."""
 
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES
     densest_fill: ClassVar[float] = 0.64
@@ -58,9 +53,6 @@ class PouredScene(WalledScene):
 
     def __post_init__(self) -> None:
         check_parameters(self)
-        if self.rate == "auto" and self.rain_rate != PouredScene.rain_rate:
-            rule = 'needs rate = "given", as the rate is found from the cross-section'
-            raise ValueError(f"{type(self).__name__}.rain_rate: {rule}, got {self.rain_rate!r}")
 
     @property
     @abstractmethod
@@ -115,7 +107,7 @@ class PouredScene(WalledScene):
 
     def grains_per_second(self, case: Case[Any]) -> float:
         """Return the rate of the rain [1/s]."""
-        if self.rate == "given":
+        if self.rain_rate is not None:
             return self.rain_rate
         size = case.grains.size_mean
         reach, mean_volume = size * case.grains.grain_reach, size**3 * case.grains.mean(lambda s: s.volume)

@@ -57,7 +57,7 @@ OTHER = {
     "tilt": 0.1,
     "vibration_amplitude": 1e-4,
     "air_drag": 1.0,
-    "rate": "auto",
+    "rain_rate": 3e3,
     "lip": 1e-3,
     "seed": 2,
     "modulus_scale": 200.0,

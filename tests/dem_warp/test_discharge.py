@@ -102,9 +102,7 @@ def test_the_rate_is_that_of_the_steady_part():
     assert DischargeState("discharge", fallen=[[0.0, 0.0], [1.0, 5.0]]).flow_rate is None
 
 
-BOXES = DrawDown(
-    width=0.08, depth=0.0165, fill_depth=0.03, slot=0.028, drop=0.045, wall_material=STEEL, rest_speed=3e-3
-)
+BOXES = DrawDown(0.08, 0.0165, 0.03, 0.028, 0.045, STEEL, rain_rate=3e3, rest_speed=3e-3)
 LOW = replace(BOXES, depth=0.009, drop=0.012)
 """Boxes whose heap reaches the slot."""
 

@@ -16,6 +16,7 @@ DRUM = Drum(
     length=0.018,
     wall_material=STEEL,
     rotation_rate=1.0,
+    rain_rate=3e3,
     start_up=0.25,
     revolutions=0.75,
     # Without friction a bed rocks to and fro for long: it is at rest when it is slow.

@@ -21,9 +21,7 @@ from dem_warp.scenes.plates import glued
 from dem_warp.scenes.tilting_box import in_box
 
 BALL_DIAMETER = 4e-3
-PEDESTAL = LiftedCylinder(
-    diameter=0.02, height=0.024, wall_material=STEEL, lift_speed=0.1, plate_diameter=0.02, rate="auto"
-)
+PEDESTAL = LiftedCylinder(0.02, 0.024, STEEL, lift_speed=0.1, plate_diameter=0.02)
 LIPPED = replace(PEDESTAL, plate_diameter=0.05, lip=4e-3)
 FUNNEL = PouredHeap(
     diameter=0.04,
@@ -225,6 +223,4 @@ def test_a_rain_that_finds_its_rate_fills_a_tenth_of_its_volume():
     open_area = math.pi * (0.02 - BALL_DIAMETER / 2) ** 2
     rate = case.scene.grains_per_second(case)
     assert rate * volume / (open_area * case.scene.rain_speed) == pytest.approx(0.1, rel=1e-12)
-    assert replace(case.scene, rate="given").grains_per_second(case) == 3000.0
-    with pytest.raises(ValueError, match=r'rain_rate: needs rate = "given"'):
-        replace(case.scene, rain_rate=100.0)
+    assert replace(case.scene, rain_rate=100.0).grains_per_second(case) == 100.0

@@ -141,12 +141,12 @@ def test_unlikely_tools_are_named_and_impossible_ones_refused():
     grains, material = ball_case(BED, 0.4).grains, GRAIN
     wide = replace(BED, diameter=0.3, tool_diameter=0.04, fill_depth=0.2, depth=0.1, speed=1e-2)
     assert wide.doubts(grains, material) == ()
-    fast, narrow, low = BED.doubts(grains, material)
+    fast, narrow, near, low = BED.doubts(grains, material)
     # v / D d / sqrt(g z)
     assert f"{BED.speed / 0.01 * 4e-3 / math.sqrt(GRAVITY * 0.01):.1e} at the whole depth" in fast
     assert "2.5 grains wide" in narrow
     assert "0.8 of its widths above the base" in low
-    assert "2.0 tools wide" in replace(BED, diameter=0.02).doubts(grains, material)[2]
+    assert "3.0 tools wide" in near
     with pytest.raises(ValueError, match=r"Penetration.speed: must be below .* an inertial number of 0.3"):
         replace(BED, speed=1.0).doubts(grains, material)
 

@@ -24,7 +24,7 @@ COUNT = 30
 
 def exported_lift(laws: str, shape: ClumpShape | ShapeMixture = ROD, **changes: Any) -> ExportedTest:
     """Return a test of these grains in the laws of a code."""
-    scene = LiftedCylinder(diameter=0.014, height=0.02, wall_material=WALL, rest_speed=3e-3)
+    scene = LiftedCylinder(diameter=0.014, height=0.02, wall_material=WALL, rain_rate=3e3, rest_speed=3e-3)
     scene = replace(scene, **({"grain_count": COUNT} | changes))
     case = Case(
         scene, GrainPopulation(shape, GRAIN), Interaction(0.5, 0.5, 0.1), Interaction(0.6, 0.4, 0.2),

@@ -1,6 +1,9 @@
 """Pieces of the small study, which tests replace, and conditions that they add."""
 
-TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
+from pathlib import Path
+
+SMALL = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")
+TUBE = SMALL[SMALL.index("[scene") : SMALL.index("\n[numerics]")]
 ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 CONDITIONS = """
 [condition.base]

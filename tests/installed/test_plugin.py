@@ -25,7 +25,7 @@ design = "corners"
 at_least = 1  # two corners have no noise to compare an effect with
 """
 MAGNETS = {"grain-magnets": "1.0"}
-TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
+TUBE = SMALL[SMALL.index("[scene") : SMALL.index("\n[numerics]")]
 JAR = '[scene.jar]\ndiameter = "12 mm"\nheight = "20 mm"\ngrain_count = 10\n'
 TABLE = "[scene.table]\ngrain_count = 4\n"
 

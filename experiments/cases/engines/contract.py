@@ -181,12 +181,11 @@ def _laws(case: Case[Any]) -> dict[str, Any]:
 
 def _scene(case: Case[Any]) -> dict[str, Any]:
     """Lay out the kind and settings of the test, and the most grains that are poured."""
-    settings = {
-        f.name: getattr(case.scene, f.name)
-        for f in dataclasses.fields(case.scene)
-        if f.name != "wall_material"
-    }
-    return {"kind": case.scene.name} | settings | {"grains_at_most": case.scene.supply(case)}
+    scene, fields = case.scene, dataclasses.fields(case.scene)
+    settings = {f.name: getattr(scene, f.name) for f in fields if f.name != "wall_material"}
+    if "rain_rate" in settings:
+        settings["rain_rate"] = scene.grains_per_second(case)
+    return {"kind": scene.name} | settings | {"grains_at_most": scene.supply(case)}
 
 
 def _walls(case: Case[Any], folder: Path) -> list[dict[str, Any]]:

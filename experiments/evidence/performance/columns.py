@@ -27,9 +27,9 @@ GRAIN_GRAIN = Interaction(restitution=0.18, static_friction=0.46, rolling_fricti
 GRAIN_WALL = Interaction(restitution=0.50, static_friction=0.38, rolling_friction=0.055)
 
 SCALES = {
-    "printed": (LiftedCylinder(0.035, 0.110, STEEL), 1.0),
-    "soft": (LiftedCylinder(0.035, 0.110, STEEL), 100.0),
-    "bench": (LiftedCylinder(0.028, 0.036, STEEL, grain_count=400), 400.0),
+    "printed": (LiftedCylinder(0.035, 0.110, STEEL, rain_rate=3e3), 1.0),
+    "soft": (LiftedCylinder(0.035, 0.110, STEEL, rain_rate=3e3), 100.0),
+    "bench": (LiftedCylinder(0.028, 0.036, STEEL, grain_count=400, rain_rate=3e3), 400.0),
 }
 """Tube and divisor of the shear modulus, as at the study's scales."""
 

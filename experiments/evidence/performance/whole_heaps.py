@@ -66,7 +66,7 @@ def case_of(
 ) -> Case[Any]:
     """Lifted cylinder of soft grains under the laws of a code."""
     soft, steel = Material(1200.0, 10e6, 0.3), Material(7800.0, 70e9, 0.3)
-    tube = LiftedCylinder(diameter=diameter, height=height, wall_material=steel, grain_count=grains)
+    tube = LiftedCylinder(diameter, height, steel, grain_count=grains, rain_rate=3e3)
     return Case(
         scene=tube,
         grains=GrainPopulation(shape, soft, size_sd=0.05),

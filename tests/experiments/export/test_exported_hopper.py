@@ -31,7 +31,7 @@ CODES = [pytest.param(code, marks=pytest.mark.program(program)) for code, progra
 def hopper(
     seed: int = 1, shape: ClumpShape | ShapeMixture | None = None, laws: str = "liggghts", **changes: Any
 ) -> Case[Hopper]:
-    scene = Hopper(0.02, 0.02, 0.012, WALL, rest_speed=3e-3, grain_count=COUNT)
+    scene = Hopper(0.02, 0.02, 0.012, WALL, rain_rate=3e3, rest_speed=3e-3, grain_count=COUNT)
     grains = GrainPopulation(shape or ClumpShape.sphere(1e-3), GRAIN, size_sd=0.0)
     friction = Interaction(0.5, 0.3, 0.05)
     return Case(

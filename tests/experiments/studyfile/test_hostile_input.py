@@ -97,7 +97,7 @@ HOSTILE = {
         "heap", 'name = "Small"', f'name = "{"x" * 2_000_000}"', "s.toml", "at most 500,000 bytes"
     ),
     "escape sequences": study("heap", 'name = "Small"', 'nome = "\\u001b[2J"', "nome", "unknown key"),
-    "an unknown key": study("heap", "n = 5", "n = 5\nm = 6", "s.toml:40: target.m", "unknown key"),
+    "an unknown key": study("heap", "n = 5", "n = 5\nm = 6", "s.toml:41: target.m", "unknown key"),
     "a negative length": study(
         "heap", 'sphere = "2 mm"', 'sphere = "-2 mm"', "grain.sphere", "greater than 0"
     ),
@@ -111,7 +111,7 @@ HOSTILE = {
         add="[campaign.surface]\ncenter = { E = -0.5 }\n"
     ),
     "no room for the rain": study(
-        "calibrate --dry-run", "= 30", '= 30\nrain_rate = "1e12 1/s"', "no free place for the rain"
+        "calibrate --dry-run", "3000 1/s", "1e12 1/s", "no free place"
     ),
     # Options
     "unknown scale": small("heap s.toml --scale huge --device cpu", "scale", "huge"),

@@ -11,7 +11,7 @@ from experiments.io.errors import StudyError
 from experiments.studyfile import load_study
 
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\n'
-COUNT = "grain_count = 30\n"
+COUNT = 'grain_count = 30\nrain_rate = "3000 1/s"\n'
 HOPPER = '[scene.hopper]\ndiameter = "40 mm"\nfill_depth = "30 mm"\noutlet = "18 mm"\n'
 DRUM = (
     '[scene.drum]\ndiameter = "32 mm"\nlength = "12 mm"\nrotation_rate = "1 1/s"\nrest_speed = "0.05 m/s"\n'

@@ -87,7 +87,7 @@ class Bench:
             np.dot([t.fraction for t in self.templates], [t.mass / t.density for t in self.templates])
         )
         room = self.lift.rain_section.open_area(0.0) * self.lift.rain_height
-        return min(self.scene.rain_rate, DENSEST_RAIN * room / (volume * self.rain_period))
+        return min(self.scene.grains_per_second(self.case), DENSEST_RAIN * room / (volume * self.rain_period))
 
     def adhesion(self) -> float:
         """Work of adhesion among grains [J/m2]."""

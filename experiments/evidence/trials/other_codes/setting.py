@@ -48,7 +48,7 @@ class Setting:
     def of(self, case: Case[Any]) -> Case[Any]:
         """Take a case to the other workshop."""
         scene = odd(
-            replace(case.scene, rain_rate=min(self.rain_rate, case.scene.rain_rate)),
+            replace(case.scene, rain_rate=min(self.rain_rate, case.scene.grains_per_second(case))),
             tube_sides=self.tube_sides,
             look_time=self.look_time,
         )

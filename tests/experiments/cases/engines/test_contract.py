@@ -63,6 +63,7 @@ def test_a_case_is_written_in_si_with_its_clump_and_its_walls(write_study: Write
     document = json.loads((tmp_path / "case" / "case.json").read_text())
     assert (document["seed"], document["gravity"]) == (7, [0.0, 0.0, -9.81])
     assert document["contact"]["grain-grain"]["static_friction"] == 0.37
+    assert document["scene"]["rain_rate"] == case.scene.grains_per_second(case)
     assert (
         document["scene"] | {"kind": "lifted-cylinder", "diameter": 0.028, "height": 0.028}
         == document["scene"]

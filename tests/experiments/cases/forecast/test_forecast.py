@@ -62,7 +62,7 @@ def test_a_case_takes_its_rain_and_the_phases_that_its_test_expects(small_study:
     case = small_study.case({}, 1)
     more = replace(case, scene=replace(case.scene, grain_count=330))
     seconds = [work_of(each).steps * each.time_step for each in (case, more)]
-    assert seconds[1] - seconds[0] == pytest.approx(300 / case.scene.rain_rate)
+    assert seconds[1] - seconds[0] == pytest.approx(300 / case.scene.grains_per_second(case))
     fixed = replace(case, scene=replace(case.scene, duration=2.5))
     assert work_of(fixed).steps * case.time_step == pytest.approx(2.5)
 
