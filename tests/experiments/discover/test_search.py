@@ -199,7 +199,7 @@ def test_the_report_says_when_another_engine_made_the_bank(tmp_path: Path) -> No
 
 def test_the_shipped_bank_knows_what_made_it() -> None:
     maker = Search.of(load_study(TRIAL, "bench")).read_bank(TRIAL.with_name("bank-bench.npz")).maker
-    assert (maker["day"], maker["commit"]) == ("2026-11-28", "e265a8b4ce43")
+    assert (maker["day"], maker["commit"]) == ("2026-11-29", "4db84d0bf9f5")
     assert len(maker["engine"]) == 64
 
 
